@@ -1,0 +1,54 @@
+"""The pinhole camera: where it stands, and the numbers that shaders and ray tracers need of it.
+
+Conventions (docs/conventions.md): right-handed world, the camera looks along its -z, +x is right, +y is up. Pixel (0, 0) is
+the top left one of an image; its centre lies half a pixel inside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import glm
+import numpy as np
+
+from .motion import CameraMotion
+from .typing import Array, Vec3
+
+
+@dataclass(frozen=True)
+class Camera:
+    """position, look_at, up: world space; fov: vertical opening angle in degrees."""
+
+    position: Vec3
+    look_at: Vec3
+    up: Vec3 = (0.0, 1.0, 0.0)
+    fov: float = 60.0
+    motion: CameraMotion | None = None
+
+    def axes(self) -> Array:
+        """Rows: right, up and forward, orthonormal, float64 (3, 3)."""
+        view = glm.lookAt(glm.dvec3(self.position), glm.dvec3(self.look_at), glm.dvec3(self.up))
+        rows = np.array(view, dtype=np.float64)[:3, :3]  # GLM's rows of the view matrix: right, up, backward
+        return rows * np.array([[1.0], [1.0], [-1.0]])
+
+    def ray_axes(self, size: tuple[int, int]) -> Array:
+        """Rows a, b, c, float64 (3, 3): the point at view depth 1 behind NDC (x, y) is position + a*x + b*y + c.
+
+        `size` is (width, height) in pixels.
+        """
+        width, height = size
+        tangent = np.tan(np.radians(self.fov) / 2)
+        return self.axes() * np.array([[tangent * width / height], [tangent], [1.0]])
+
+    def rays(self, size: tuple[int, int]) -> Array:
+        """Directions through all pixel centres, not normalised (view depth 1), float64 (H, W, 3), top row first."""
+        width, height = size
+        a, b, c = self.ray_axes(size)
+        x = (np.arange(width) + 0.5) / width * 2 - 1
+        y = 1 - (np.arange(height) + 0.5) / height * 2
+        directions: Array = x[None, :, None] * a + y[:, None, None] * b + c
+        return directions
+
+    def at(self, time: float) -> Camera:
+        """The camera at `time` seconds of its motion."""
+        return self.motion.camera(self, time) if self.motion else self

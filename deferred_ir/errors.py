@@ -1,0 +1,54 @@
+"""Everything deferred-ir raises on purpose.
+
+    Error
+    |-- SceneError      a scene file, model, texture or material
+    |-- GraphError      a graph file, pass, port or parameter; lists all faults at once
+    |-- SettingError    an option of a call or of the command line
+    |-- DeviceError     no OpenGL, too little of it, or a refused allocation
+    |-- ShaderError     GLSL that does not compile or link
+    `-- OutputError     a result that cannot be written
+
+Each message is one line: the file, the key, what is wrong and how to mend it.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class Error(Exception):
+    """Base of all errors of this package."""
+
+
+class SceneError(Error):
+    """A scene, or a file it names, cannot be used."""
+
+
+class GraphError(Error):
+    """A render graph cannot be read or compiled."""
+
+
+class SettingError(Error):
+    """An option has a value that cannot be used."""
+
+
+class DeviceError(Error):
+    """OpenGL is missing, too old, or refused an allocation."""
+
+
+class ShaderError(Error):
+    """A shader does not compile or link."""
+
+
+class OutputError(Error):
+    """A result cannot be written."""
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """`; did you mean 'x'?` for the nearest of `known`, else `; known: a, b, c`."""
+    names = sorted(known)
+    close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    if close:
+        return f"; did you mean '{close[0]}'?"
+    return f"; known: {', '.join(names)}" if names else ""

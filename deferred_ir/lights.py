@@ -1,0 +1,100 @@
+"""The light model of docs/conventions.md: one spotlight, the VPLs it makes, and the record in which shaders read both.
+
+The spotlight's intensity is I(w) = E cos(theta) cone(theta) [W/sr per channel], theta from its axis. A VPL shines as
+I(w) = E_i cos(theta_y) inside a round cone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .motion import SpotlightMotion
+from .typing import Array, Vec3
+
+LIGHT = np.dtype(
+    [
+        ("position", "f4", 3),
+        ("one_minus_cos", "f4"),  # 1 - cos of the half cone angle, without cancellation
+        (
+            "x_axis",
+            "f4",
+            3,
+        ),  # right and up of the light's map, divided by tan(half angle): NDC = dot(d, axis) / dot(d, z)
+        ("tan_half", "f4"),
+        ("y_axis", "f4", 3),
+        ("near", "f4"),
+        ("z_axis", "f4", 3),  # unit; where the light looks
+        ("tile", "f4"),  # number of its tile in the atlas; the spotlight's (-1) is a whole layer
+        ("emission", "f4", 3),
+        ("unused", "f4"),
+    ]
+)
+"""One light in a std140 uniform block; `shaders/lib/light.glsl` declares the same five vec4."""
+
+NEAR = 1e-4
+"""Near planes of camera and lights, as a fraction of the scene's diagonal."""
+
+SPOT_TILE = -1.0
+
+
+@dataclass(frozen=True)
+class Spotlight:
+    """position, look_at: world space; fov: full opening angle in degrees; emission: E, linear RGB; radius: of a disc."""
+
+    position: Vec3
+    look_at: Vec3
+    fov: float = 80.0
+    emission: Vec3 = (1.0, 1.0, 1.0)
+    radius: float = 0.0
+    motion: SpotlightMotion | None = None
+
+    @property
+    def axis(self) -> Array:
+        """Unit direction in which it looks, float64 (3,)."""
+        axis = np.subtract(self.look_at, self.position).astype(np.float64)
+        unit: Array = axis / np.linalg.norm(axis)
+        return unit
+
+    def cone(self, directions: Array) -> Array:
+        """Soft edge clamp(4 (cos theta - cos(fov/2)) / (1 - cos(fov/2)), 0, 1) for unit directions (..., 3).
+
+        1 - cos theta = |w - a|^2 / 2 and 1 - cos(fov/2) = 2 sin^2(fov/4): the plain differences cancel for narrow cones.
+        """
+        off_axis = ((directions - self.axis) ** 2).sum(axis=-1) / 2
+        edge = one_minus_cos(self.fov)
+        inside: Array = np.clip(4 * (edge - off_axis) / edge, 0, 1)
+        return inside
+
+    def at(self, time: float) -> Spotlight:
+        """The spotlight at `time` seconds of its motion."""
+        return self.motion.spotlight(self, time) if self.motion else self
+
+
+def one_minus_cos(fov: float) -> float:
+    """1 - cos(fov/2) for a full opening angle in degrees."""
+    return float(2 * np.sin(np.radians(fov) / 4) ** 2)
+
+
+def frames(axes: Array) -> tuple[Array, Array]:
+    """Right and up vectors that make right-handed orthonormal frames with unit `axes` (..., 3) (Duff et al. 2017)."""
+    x, y, z = np.moveaxis(np.asarray(axes, dtype=np.float64), -1, 0)
+    sign = np.where(z < 0, -1.0, 1.0)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    right = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=-1)
+    up = np.stack([b, sign + y * y * a, -y], axis=-1)
+    return right, up
+
+
+def light_records(position: Array, axis: Array, emission: Array, fov: float, near: float, tile: Array) -> np.ndarray:
+    """Pack lights with one cone angle `fov` (degrees) into LIGHT records, shape (n,). Inputs are (n, 3), tile (n,)."""
+    records = np.zeros(len(position), dtype=LIGHT)
+    right, up = frames(axis)
+    tangent = np.tan(np.radians(fov) / 2)
+    records["position"], records["z_axis"], records["emission"] = position, axis, emission
+    records["x_axis"], records["y_axis"] = right / tangent, up / tangent
+    records["tan_half"], records["one_minus_cos"], records["near"] = tangent, one_minus_cos(fov), near
+    records["tile"] = tile
+    return records

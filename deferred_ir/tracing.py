@@ -1,0 +1,129 @@
+"""Ray queries with Embree: closest hits with everything a light path needs, and occlusion between points.
+
+embreex runs in one thread and releases the GIL, so rays go out in chunks over a thread pool. It is an optional
+dependency (no Linux arm64 wheel): without it `Tracer` raises a one-line DeviceError.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from . import materials
+from .errors import DeviceError
+from .scene import Scene
+from .typing import Array, Bools, Ints
+
+CHUNK = 1 << 15
+OFFSET = 1e-5
+"""Ray origins are pushed off their surface by this fraction of the scene's extent (float32 positions err by 1e-7)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Closest hits of n rays; rows of rays that miss hold zeros and face -1.
+
+    face: int32 (n,). position: float64 (n, 3). albedo: float64 (n, 3).
+    normal: geometric normal, shading_normal: both unit, float64 (n, 3), turned against the ray as docs/conventions.md says.
+    """
+
+    face: Ints
+    position: Array
+    normal: Array
+    shading_normal: Array
+    albedo: Array
+
+    @property
+    def hit(self) -> Bools:
+        """Which rays met a surface, bool (n,)."""
+        return self.face >= 0
+
+
+class Tracer:
+    """Embree over one scene's triangles. Build it once a scene; `seconds` is the time spent inside Embree so far."""
+
+    def __init__(self, scene: Scene) -> None:
+        try:
+            from embreex import rtcore_scene
+            from embreex.mesh_construction import TriangleMesh
+        except ImportError as error:
+            raise DeviceError(
+                "embreex: not installed, so no rays can be traced; pip install embreex, or render with --vpls 0"
+            ) from error
+        self.scene = scene
+        self.seconds = 0.0
+        geometry = scene.geometry
+        self._embree = rtcore_scene.EmbreeScene(robust=True)
+        TriangleMesh(self._embree, geometry.positions.astype(np.float32), geometry.faces.astype(np.int32))
+        self.offset = OFFSET * float(max(geometry.diagonal, np.abs(geometry.bounds).max()))
+        # The first ray commits Embree's scene, which must not happen in two threads at once.
+        self._embree.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+
+    @cached_property
+    def _pool(self) -> ThreadPoolExecutor:
+        return ThreadPoolExecutor(os.cpu_count())
+
+    def _map(self, function: Callable[[slice], Any], count: int) -> list[Any]:
+        """`function` of each chunk of `count` rays, in order; on the pool only where there is more than one."""
+        chunks = [slice(start, start + CHUNK) for start in range(0, count, CHUNK)]
+        start = time.perf_counter()
+        results = list(self._pool.map(function, chunks)) if len(chunks) > 1 else [function(chunk) for chunk in chunks]
+        self.seconds += time.perf_counter() - start
+        return results
+
+    def closest(self, origins: Array, directions: Array) -> Hits:
+        """First surfaces that rays (n, 3), (n, 3) meet; the caller offsets origins that lie on a surface."""
+        org, dirs = origins.astype(np.float32), directions.astype(np.float32)
+        parts = self._map(lambda chunk: self._embree.run(org[chunk], dirs[chunk], output=1), len(org))
+        face = np.concatenate([np.asarray(part["primID"], np.int32) for part in parts] or [np.zeros(0, np.int32)])
+        u = np.concatenate([part["u"] for part in parts] or [np.zeros(0)]).astype(np.float64)
+        v = np.concatenate([part["v"] for part in parts] or [np.zeros(0)]).astype(np.float64)
+        return self._hits(face, np.stack([1 - u - v, u, v], axis=-1), np.asarray(directions, np.float64))
+
+    def _hits(self, face: Ints, weights: Array, directions: Array) -> Hits:
+        geometry = self.scene.geometry
+        hit = face >= 0
+        corners, weights = geometry.faces[face[hit]], weights[hit][..., None]
+        position, normal, shading, albedo = (np.zeros((len(face), 3)) for _ in range(4))
+        position[hit] = (geometry.positions[corners] * weights).sum(axis=1)
+        facing = turned(geometry.face_normals[face[hit]], -directions[hit])
+        smooth = facing.copy()
+        if geometry.normals is not None:
+            blend = (geometry.normals[corners].astype(np.float64) * weights).sum(axis=1)
+            length = np.linalg.norm(blend, axis=1)
+            has = length > 1e-6
+            smooth[has] = turned(blend[has] / length[has, None], facing[has])
+        normal[hit], shading[hit] = facing, smooth
+        albedo[hit] = materials.albedo(self.scene, face[hit], weights[..., 0])
+        return Hits(face, position, normal, shading, albedo)
+
+    def occluded(self, origins: Array, targets: Array) -> Bools:
+        """Whether anything lies strictly between points (n, 3) and (n, 3), bool (n,).
+
+        Both ends stop short by a ten-thousandth of the way; a point on a surface also needs its offset (see `lift`).
+        """
+        org, way = origins.astype(np.float32), (targets - origins).astype(np.float32)
+        reach = np.full(len(org), 1 - 1e-4, np.float32)
+        parts = self._map(
+            lambda chunk: self._embree.run(org[chunk], way[chunk], dists=reach[chunk].copy(), query="OCCLUDED"),
+            len(org),
+        )
+        return np.concatenate([np.asarray(part) == 0 for part in parts] or [np.zeros(0, bool)])
+
+    def lift(self, positions: Array, normals: Array) -> Array:
+        """Points pushed off their surfaces along `normals`, so that rays from them do not meet it again."""
+        lifted: Array = positions + normals * self.offset
+        return lifted
+
+
+def turned(normals: Array, towards: Array) -> Array:
+    """`normals` (n, 3), flipped where they point away from `towards` (n, 3)."""
+    away = (normals * towards).sum(axis=-1, keepdims=True) < 0
+    return np.where(away, -normals, normals)

@@ -1,7 +1,7 @@
 """The pinhole camera: where it stands, and the numbers that shaders and ray tracers need of it.
 
-Conventions (docs/conventions.md): right-handed world, the camera looks along its -z, +x is right, +y is up. Pixel (0, 0) is
-the top left one of an image; its centre lies half a pixel inside.
+Conventions (docs/conventions.md): right-handed world, the camera looks along its -z, +x is right, +y is up.
+Pixel (0, 0) is the top left one of an image; its centre lies half a pixel inside.
 """
 
 from __future__ import annotations

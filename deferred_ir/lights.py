@@ -21,7 +21,7 @@ LIGHT = np.dtype(
             "x_axis",
             "f4",
             3,
-        ),  # right and up of the light's map, divided by tan(half angle): NDC = dot(d, axis) / dot(d, z)
+        ),  # right and up, divided by tan(half angle): NDC = dot(d, axis) / dot(d, z)
         ("tan_half", "f4"),
         ("y_axis", "f4", 3),
         ("near", "f4"),
@@ -41,7 +41,7 @@ SPOT_TILE = -1.0
 
 @dataclass(frozen=True)
 class Spotlight:
-    """position, look_at: world space; fov: full opening angle in degrees; emission: E, linear RGB; radius: of a disc."""
+    """position, look_at: world space; fov: full opening angle, degrees; emission: E, linear RGB; radius: of a disc."""
 
     position: Vec3
     look_at: Vec3
@@ -60,7 +60,7 @@ class Spotlight:
     def cone(self, directions: Array) -> Array:
         """Soft edge clamp(4 (cos theta - cos(fov/2)) / (1 - cos(fov/2)), 0, 1) for unit directions (..., 3).
 
-        1 - cos theta = |w - a|^2 / 2 and 1 - cos(fov/2) = 2 sin^2(fov/4): the plain differences cancel for narrow cones.
+        1 - cos theta = |w - a|^2 / 2 and 1 - cos(fov/2) = 2 sin^2(fov/4): plain differences cancel for narrow cones.
         """
         off_axis = ((directions - self.axis) ** 2).sum(axis=-1) / 2
         edge = one_minus_cos(self.fov)
@@ -88,7 +88,7 @@ def frames(axes: Array) -> tuple[Array, Array]:
     return right, up
 
 
-def light_records(position: Array, axis: Array, emission: Array, fov: float, near: float, tile: Array) -> np.ndarray:
+def light_records(position: Array, axis: Array, emission: Array, *, fov: float, near: float, tile: Array) -> np.ndarray:
     """Pack lights with one cone angle `fov` (degrees) into LIGHT records, shape (n,). Inputs are (n, 3), tile (n,)."""
     records = np.zeros(len(position), dtype=LIGHT)
     right, up = frames(axis)

@@ -1,4 +1,4 @@
-"""Motions of the camera, the spotlight and models: what `[*.motion]` of a scene file says, evaluated at a time in seconds."""
+"""Motions of camera, spotlight and models: what `[*.motion]` of a scene file says, evaluated at a time in seconds."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class CameraMotion:
 
 @dataclass(frozen=True)
 class LissajousMotion:
-    """p(t) = position + (ax cos(t w_xz), ay cos(t w_y), az sin(t w_xz)); speed = (w_xz, w_y) in rad/s (Laine et al. 2007)."""
+    """p(t) = position + (ax cos(t w_xz), ay cos(t w_y), az sin(t w_xz)); speed = (w_xz, w_y), rad/s."""
 
     amplitude: Vec3
     speed: tuple[float, float]

@@ -29,7 +29,7 @@ class Texture:
 
 @dataclass(frozen=True)
 class Material:
-    """Lambertian: reflectance = albedo (linear RGB) times the texture (index into Scene.textures), where there is one."""
+    """Lambertian: reflectance = albedo (linear RGB) times the texture (index into Scene.textures), if any."""
 
     name: str
     albedo: tuple[float, float, float]

@@ -1,0 +1,1 @@
+"""Global illumination from Python in milliseconds: instant radiosity and deferred shading on OpenGL."""

@@ -1,0 +1,1 @@
+"""Graph files, read by name."""

@@ -1,0 +1,1 @@
+"""Built-in scenes and the scripts that made them."""

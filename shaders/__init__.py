@@ -1,0 +1,1 @@
+"""GLSL, one topic a file."""

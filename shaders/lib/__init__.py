@@ -1,0 +1,1 @@
+"""GLSL shared by writers and readers."""

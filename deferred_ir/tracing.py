@@ -31,7 +31,8 @@ class Hits:
     """Closest hits of n rays; rows of rays that miss hold zeros and face -1.
 
     face: int32 (n,). position: float64 (n, 3). albedo: float64 (n, 3).
-    normal: geometric normal, shading_normal: both unit, float64 (n, 3), turned against the ray as docs/conventions.md says.
+    normal: geometric normal, shading_normal: both unit, float64 (n, 3), turned
+        against the ray as docs/conventions.md says.
     """
 
     face: Ints

@@ -83,6 +83,8 @@ def libegl() -> str:
 
 def list_devices() -> list[Device]:
     """All EGL devices, in EGL's order. Raises DeviceError if EGL or its device extensions are missing."""
+    # Mesa warns on stderr of each device that fails, which `auto` passes over; our own errors tell it all.
+    os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
     try:
         egl = ctypes.CDLL(libegl())
     except OSError as error:
@@ -235,22 +237,30 @@ def _open(device: Device, version: int) -> tuple[moderngl.Context, Loader, Devic
     # glcontext's front door lets environment variables overrule its arguments; the module behind it does as told.
     from glcontext import egl
 
-    failure: Exception | None = None
+    failures: list[Exception] = []
     # libEGL hands out OpenGL functions, too, so that neither libGL nor X11 is needed; old ones do not.
     for libgl in dict.fromkeys((os.environ.get("GLCONTEXT_LINUX_LIBGL") or libegl(), "libGL.so.1", "libOpenGL.so.0")):
         try:
             loader = egl.create_context(
                 mode="standalone", glversion=version, libgl=libgl, libegl=libegl(), device_index=device.index
             )
+        except Exception as error:  # glcontext raises plain Exception
+            if "not loaded" not in str(error):
+                failures = [error]
+                break
+            failures.append(error)
+            continue
+        try:
             context = moderngl.create_context(context=loader)
-        except Exception as error:  # both libraries raise plain Exception
-            failure = failure or error
+        except Exception as error:  # as moderngl does, for functions that this libgl does not hand out
+            failures.append(error)
             continue
         name = context.info["GL_RENDERER"]
         kind: Literal["hardware", "software"] = (
             "software" if device.kind == "software" or _SOFTWARE_NAMES.search(name) else "hardware"
         )
         return context, loader, replace(device, name=name, kind=kind)
+    failure = failures[0]
     if device.kind == "software" and "0x3001" in str(failure):
         mend = "its driver is missing: apt install libgl1-mesa-dri"
     else:

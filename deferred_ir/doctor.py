@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import importlib
 import json
 import os
@@ -193,11 +192,8 @@ def _rays() -> Check:
 
 
 def _library() -> Check:
-    try:
-        ctypes.CDLL(devices.libegl())
-    except OSError as error:
-        return Check("EGL library", False, str(error), devices.INSTALL)
-    return Check("EGL library", True, devices.libegl())
+    fault = devices.load_fault(devices.libegl())
+    return Check("EGL library", not fault, fault or devices.libegl(), devices.INSTALL if fault else "")
 
 
 def _vendors() -> Check:
@@ -209,9 +205,12 @@ def _vendors() -> Check:
     for path in paths:
         try:
             library = json.loads(path.read_text())["ICD"]["library_path"]
-            ctypes.CDLL(library)
         except (OSError, ValueError, KeyError) as error:
             broken.append(f"{path}: {error}")
+            continue
+        fault = devices.load_fault(library)
+        if fault:
+            broken.append(f"{path.name} ({fault})")
         else:
             found.append(f"{path.name} ({library})")
     ok = bool(found) and not broken

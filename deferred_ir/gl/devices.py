@@ -81,6 +81,15 @@ def libegl() -> str:
     return os.environ.get("GLCONTEXT_LINUX_LIBEGL") or "libEGL.so.1"
 
 
+def load_fault(library: str) -> str:
+    """Why a shared library cannot be loaded, "" if it can."""
+    try:
+        ctypes.CDLL(library)
+    except OSError as error:
+        return str(error)
+    return ""
+
+
 def list_devices() -> list[Device]:
     """All EGL devices, in EGL's order. Raises DeviceError if EGL or its device extensions are missing."""
     # Mesa warns on stderr of each device that fails, which `auto` passes over; our own errors tell it all.

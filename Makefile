@@ -1,0 +1,54 @@
+# `make demo` and `make test` work on a fresh clone: system parts, virtual environment and installation included.
+
+VENV   := .venv
+BIN    := $(VENV)/bin
+# The first Python that is new enough; another one by `make PYTHON=...`.
+PYTHON ?= $(shell for python in python3 python3.14 python3.13 python3.12 python3.11; do \
+	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$python && break; done)
+PIP    := $(BIN)/python -m pip install --quiet --no-input --disable-pip-version-check
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help demo test lint types clean
+
+help:  ## this list
+	@echo "deferred-ir: global illumination on OpenGL"
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1	\2/p' Makefile
+
+demo: $(VENV)/installed  ## install, render the Cornell box to out/cornell.png
+	@$(BIN)/python tools/system.py opengl
+	@mkdir -p out
+	@$(BIN)/deferred-ir render cornell -o out/cornell.png
+	@echo "$(CURDIR)/out/cornell.png"
+
+test: lint types  ## install, check style and types, run all tests
+	@$(BIN)/python tools/system.py opengl
+	@$(BIN)/python -m pytest
+
+lint: $(VENV)/installed-dev
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/ruff format --quiet --check . || { echo "not formatted; run $(BIN)/ruff format ."; exit 1; }
+
+types: $(VENV)/installed-dev
+	@$(BIN)/python tools/typecheck.py
+
+clean:  ## remove the environment, caches and output
+	@rm -rf $(VENV) build dist out *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(VENV)/created:
+	@test -n "$(PYTHON)" || { echo "Python 3.11 or newer is needed: install it, or make PYTHON=/path/to/python3"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "$(PYTHON) is too old, Python 3.11 or newer is needed: make PYTHON=/path/to/python3"; exit 1; }
+	@$(PYTHON) tools/system.py venv
+	@echo "Installing into $(VENV)"
+	@$(PYTHON) -m venv --clear $(VENV)
+	@touch $@
+
+$(VENV)/installed: pyproject.toml | $(VENV)/created
+	@$(PIP) -e . </dev/null
+	@touch $@
+
+$(VENV)/installed-dev: pyproject.toml | $(VENV)/created
+	@$(PIP) -e '.[dev]' </dev/null
+	@touch $@ $(VENV)/installed

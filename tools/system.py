@@ -1,0 +1,78 @@
+"""System parts that pip cannot install: `python tools/system.py venv|opengl`.
+
+Looks for the part, installs it by apt-get where that is possible and allowed, else says in one line what to install.
+Runs before anything is installed, so it uses the standard library only (`opengl` runs with deferred-ir in place).
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+
+PACKAGES = {"venv": ["python3-venv"], "opengl": ["libegl1", "libgl1-mesa-dri"]}
+OPEN_CONTEXT = """
+from deferred_ir.errors import Error
+from deferred_ir.gl.devices import create_context
+try:
+    create_context()
+except Error as error:
+    raise SystemExit(str(error))
+"""
+PROBES = {"venv": "import venv, ensurepip", "opengl": OPEN_CONTEXT}
+
+
+def fault(part: str) -> str:
+    """What is wrong with `part`, "" if nothing; in a fresh process, which sees what apt-get just installed."""
+    probe = subprocess.run([sys.executable, "-c", PROBES[part]], capture_output=True, text=True, check=False)
+    return (probe.stderr.strip().splitlines() or ["no message"])[-1] if probe.returncode else ""
+
+
+def apt_get() -> list[str]:
+    """The command that may install packages, [] if there is none."""
+    if sys.platform != "linux" or not shutil.which("apt-get"):
+        return []
+    if os.geteuid() == 0:
+        return ["apt-get"]
+    sudo = shutil.which("sudo")
+    allowed = sudo and subprocess.run([sudo, "-n", "true"], capture_output=True, check=False).returncode == 0
+    return [sudo, "-n", "apt-get"] if sudo and allowed else []
+
+
+def install(command: list[str], packages: list[str]) -> None:
+    """Updates the package lists and installs; tells of a failure but leaves the verdict to a second look."""
+    environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+    for arguments in (["update"], ["install", "-y", "--no-install-recommends", *packages]):
+        done = subprocess.run(
+            [*command, "-qq", *arguments],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+        )
+        if done.returncode:
+            print(f"apt-get {arguments[0]} failed: {(done.stdout.strip().splitlines() or [''])[-1]}", file=sys.stderr)
+
+
+def main(part: str) -> int:
+    """Exit status 0 if `part` is there, or was installed."""
+    first = fault(part)
+    if not first:
+        return 0
+    packages = PACKAGES[part]
+    command = apt_get()
+    if command:
+        print(f"Installing {' '.join(packages)} (apt-get)", flush=True)
+        install(command, packages)
+        first = fault(part)
+        if not first:
+            return 0
+    print(f"{first}\nInstall by hand: apt-get install {' '.join(packages)}", file=sys.stderr)
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -5,7 +5,7 @@ BIN    := $(VENV)/bin
 # The first Python that is new enough; another one by `make PYTHON=...`.
 PYTHON ?= $(shell for python in python3 python3.14 python3.13 python3.12 python3.11; do \
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$python && break; done)
-PIP    := $(BIN)/python -m pip install --quiet --no-input --disable-pip-version-check
+PIP    := $(BIN)/python -m pip install -qq --no-input --disable-pip-version-check
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:

@@ -40,7 +40,7 @@ def install(target: Path) -> None:
         for file in ("pyproject.toml", "README.md", "LICENSE"):
             if (ROOT / file).exists():
                 shutil.copy(ROOT / file, copy / file)
-        pip = [sys.executable, "-m", "pip", "install", "-q", "--disable-pip-version-check", "--root-user-action=ignore"]
+        pip = [sys.executable, "-m", "pip", "install", "-qq", "--disable-pip-version-check"]
         subprocess.run([*pip, "--no-deps", "--no-build-isolation", "--target", target, copy], check=True)
 
 

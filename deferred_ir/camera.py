@@ -29,7 +29,8 @@ class Camera:
         """Rows: right, up and forward, orthonormal, float64 (3, 3)."""
         view = glm.lookAt(glm.dvec3(self.position), glm.dvec3(self.look_at), glm.dvec3(self.up))
         rows = np.array(view, dtype=np.float64)[:3, :3]  # GLM's rows of the view matrix: right, up, backward
-        return rows * np.array([[1.0], [1.0], [-1.0]])
+        axes: Array = rows * np.array([[1.0], [1.0], [-1.0]])
+        return axes
 
     def ray_axes(self, size: tuple[int, int]) -> Array:
         """Rows a, b, c, float64 (3, 3): the point at view depth 1 behind NDC (x, y) is position + a*x + b*y + c.
@@ -38,7 +39,8 @@ class Camera:
         """
         width, height = size
         tangent = np.tan(np.radians(self.fov) / 2)
-        return self.axes() * np.array([[tangent * width / height], [tangent], [1.0]])
+        axes: Array = self.axes() * np.array([[tangent * width / height], [tangent], [1.0]])
+        return axes
 
     def rays(self, size: tuple[int, int]) -> Array:
         """Directions through all pixel centres, not normalised (view depth 1), float64 (H, W, 3), top row first."""

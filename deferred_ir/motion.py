@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -55,8 +56,12 @@ class LissajousMotion:
         """`light`, moved to where it is at `time`; it keeps aiming at its look_at."""
         (ax, ay, az), (w_xz, w_y) = self.amplitude, self.speed
         x, y, z = light.position
-        moved = (x + ax * np.cos(time * w_xz), y + ay * np.cos(time * w_y), z + az * np.sin(time * w_xz))
-        return replace(light, position=tuple(float(v) for v in moved))
+        moved = (
+            x + ax * math.cos(time * w_xz),
+            y + ay * math.cos(time * w_y),
+            z + az * math.sin(time * w_xz),
+        )
+        return replace(light, position=moved)
 
 
 @dataclass(frozen=True)

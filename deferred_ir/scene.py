@@ -38,11 +38,12 @@ class Material:
 
 @dataclass(frozen=True)
 class Model:
-    """One [[model]] of the scene file and the range of faces and vertices that came from it."""
+    """One [[model]] of the scene file and its range of vertices.
+
+    Its faces are those that use these vertices; they need not be neighbours, since faces are sorted by texture.
+    """
 
     name: str
-    first_face: int
-    face_count: int
     first_vertex: int
     vertex_count: int
     motion: ModelMotion | None = None
@@ -54,7 +55,8 @@ class Geometry:
 
     positions: float64 (V, 3).
     faces: int32 (F, 3), counter-clockwise from the front.
-    face_materials: int32 (F,), index into Scene.materials.
+    face_materials: int32 (F,), index into Scene.materials. Faces are sorted by their material's texture: first those
+        without one, then texture 0, 1, ...
     normals: float32 (V, 3) unit shading normals, a zero row where the file has none (the face's normal counts there);
         None if no vertex has one.
     uvs: float32 (V, 2), or None if no material has a texture.
@@ -80,7 +82,8 @@ class Geometry:
         length = np.linalg.norm(cross, axis=1)
         flat = length < 1e-30
         cross[flat], length[flat] = (0, 1, 0), 1
-        return cross / length[:, None]
+        normals: Array = cross / length[:, None]
+        return normals
 
     @cached_property
     def bounds(self) -> Array:

@@ -1,0 +1,243 @@
+"""Chooses a camera or a spotlight for a scene that has none.
+
+Inside and looking across where rays from the middle meet surfaces nearly all around, else from outside. The light's E
+makes the mean direct irradiance of what the camera sees 1. Everything is deterministic; +y is up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .camera import Camera
+from .errors import DeviceError
+from .lights import Spotlight
+from .scene import Scene
+from .typing import Array, Vec3
+
+if TYPE_CHECKING:
+    from .tracing import Tracer
+
+UP = np.array([0.0, 1.0, 0.0])
+ENCLOSED = 0.75
+"""A point is inside where this part of the rays from it meets a surface: an open side of a box (5/6) still counts."""
+SOLID = 0.95
+"""A point is within a solid where this part of the surfaces around it shows it their backs."""
+INSIDE_FOV, OUTSIDE_FOV, ROOM_LIGHT_FOV = 75.0, 45.0, 120.0
+VIEW_FROM = np.array([0.55, 0.45, 1.0])
+"""Direction from the middle to a camera outside: a three-quarter view."""
+MARGIN = 1.1
+
+
+def fitted(scene: Scene, camera: bool, spotlight: bool) -> Scene:
+    """`scene` with its camera and its spotlight replaced by chosen ones, as the two flags say; fills Scene.chosen."""
+    if not (camera or spotlight):
+        return scene
+    from .tracing import Tracer
+
+    try:
+        tracer = Tracer(scene)
+    except DeviceError:
+        return _fitted_to_bounds(scene, camera, spotlight)
+    chosen: dict[str, Any] = {}
+    middle = _middle(tracer) if camera else _seen_middle(tracer, scene.camera)
+    if camera:
+        view = _outside_camera(scene) if middle is None else _inside_camera(tracer, middle)
+        why = "from outside, framing the whole" if middle is None else "inside, looking across"
+        scene = replace(scene, camera=view)
+        chosen["camera"] = _plain(view, why)
+    if spotlight:
+        light = _outside_light(scene) if middle is None else _room_light(tracer, scene.camera, middle)
+        light, why = _with_emission(tracer, scene.camera, light)
+        scene = replace(scene, spotlight=light)
+        chosen["spotlight"] = _plain(light, why)
+    return replace(scene, chosen=chosen)
+
+
+def _fitted_to_bounds(scene: Scene, camera: bool, spotlight: bool) -> Scene:
+    """The choice where no rays can be traced."""
+    chosen = {}
+    if camera:
+        view = _outside_camera(scene)
+        scene = replace(scene, camera=view)
+        chosen["camera"] = _plain(view, "from outside, framing the whole: without embreex no rays tell what is inside")
+    if spotlight:
+        light = _lit(_outside_light(scene), _distance_squared(scene))
+        scene = replace(scene, spotlight=light)
+        chosen["spotlight"] = _plain(light, "irradiance of 1 at the middle: without embreex no rays tell what is lit")
+    return replace(scene, chosen=chosen)
+
+
+def _plain(item: Camera | Spotlight, why: str) -> dict[str, Any]:
+    """What JSON can hold of a camera or a spotlight."""
+    keys = ("position", "look_at", "up", "fov", "emission", "radius")
+    values = {key: getattr(item, key) for key in keys if hasattr(item, key)}
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()} | {"why": why}
+
+
+def _vec3(values: Array) -> Vec3:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
+def _unit(vector: Array) -> Array:
+    unit: Array = vector / np.linalg.norm(vector)
+    return unit
+
+
+def _sphere(count: int) -> Array:
+    """Directions spread evenly over the sphere (a Fibonacci lattice), float64 (count, 3)."""
+    index = np.arange(count) + 0.5
+    y = 1 - 2 * index / count
+    angle, ring = np.pi * (1 + 5**0.5) * index, np.sqrt(1 - y * y)
+    return np.stack([ring * np.cos(angle), y, ring * np.sin(angle)], axis=-1)
+
+
+def _distances(tracer: Tracer, origins: Array, directions: Array) -> tuple[Array, Array]:
+    """How far rays (n, 3), (n, 3) go (infinite for a miss), and how much the faces they meet look at them (-1 to 1)."""
+    hits = tracer.closest(origins, directions)
+    way = np.where(hits.hit, np.linalg.norm(hits.position - origins, axis=1), np.inf)
+    facing = -(tracer.scene.geometry.face_normals[hits.face] * directions).sum(axis=1)
+    return way, np.where(hits.hit, facing, 0.0)
+
+
+def _clearances(tracer: Tracer, points: Array) -> Array:
+    """How far away the nearer surfaces around `points` (n, 3) are; negative for points that are not inside a room."""
+    directions = _sphere(128)
+    origins = np.repeat(points, len(directions), axis=0)
+    way, facing = _distances(tracer, origins, np.tile(directions, (len(points), 1)))
+    way, facing = way.reshape(len(points), -1), facing.reshape(len(points), -1)
+    hit = np.isfinite(way)
+    enclosed = hit.mean(axis=1) >= ENCLOSED
+    solid = (facing < 0).sum(axis=1) >= SOLID * np.maximum(hit.sum(axis=1), 1)
+    nearer = np.sort(way, axis=1)[:, len(directions) // 10]
+    clearances: Array = np.where(enclosed & ~solid, nearer, -1.0)
+    return clearances
+
+
+def _middle(tracer: Tracer) -> Array | None:
+    """The point in the middle of the largest room, or None where nothing is a room.
+
+    The middle of the bounding box is tried first; it may lie in a table or a column, so points around it are, too.
+    """
+    low, high = tracer.scene.geometry.bounds
+    steps = np.array([0.5, 0.35, 0.65, 0.2, 0.8])
+    grid = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = low + grid * (high - low)
+    clearances = _clearances(tracer, points)
+    best = int(np.argmax(clearances))
+    return points[best] if clearances[best] > 0 else None
+
+
+def _seen_middle(tracer: Tracer, camera: Camera) -> Array | None:
+    """The point half way to what a given camera looks at, or None where that is not inside a room."""
+    position, forward = np.array(camera.position), camera.axes()[2]
+    way, _ = _distances(tracer, position[None], forward[None])
+    if not np.isfinite(way[0]):
+        return None
+    middle = position + forward * way[0] / 2
+    return middle if _clearances(tracer, middle[None])[0] > 0 else None
+
+
+def _free_way(tracer: Tracer, point: Array, directions: Array) -> Array:
+    """How far one can go from `point` along `directions` (n, 3) before a surface, or before leaving the bounds."""
+    low, high = tracer.scene.geometry.bounds
+    with np.errstate(divide="ignore", invalid="ignore"):
+        exits = np.where(directions > 0, (high - point) / directions, (low - point) / directions)
+    exits = np.where(directions == 0, np.inf, exits).min(axis=1)
+    way, _ = _distances(tracer, np.tile(point, (len(directions), 1)), directions)
+    free: Array = np.minimum(way, exits)
+    return free
+
+
+def _inside_camera(tracer: Tracer, middle: Array) -> Camera:
+    """From near a wall, through the middle, in the level direction that shows the most of the room."""
+    angles = np.arange(24) * (2 * np.pi / 24)
+    forwards = np.stack([np.sin(angles), np.zeros(24), -np.cos(angles)], axis=-1)
+    positions = middle - forwards * 0.9 * _free_way(tracer, middle, -forwards)[:, None]
+    cameras = [
+        Camera(_vec3(position), _vec3(position + forward * tracer.scene.geometry.diagonal / 4), fov=INSIDE_FOV)
+        for position, forward in zip(positions, forwards, strict=True)
+    ]
+    rays = [camera.rays((12, 12)).reshape(-1, 3) for camera in cameras]
+    origins = np.repeat(positions, 144, axis=0)
+    hits = tracer.closest(origins, np.concatenate(rays))
+    depths = np.where(hits.hit, np.linalg.norm(hits.position - origins, axis=1), 0.0)
+    # The median over the view is large only where most rays meet something, and nothing near stands in the way.
+    return cameras[int(np.argmax(np.median(depths.reshape(24, -1), axis=1)))]
+
+
+def _outside_camera(scene: Scene) -> Camera:
+    """A three-quarter view from above that holds all corners of the bounds, with a margin."""
+    low, high = scene.geometry.bounds
+    centre = (low + high) / 2
+    towards = _unit(VIEW_FROM)
+    right = _unit(np.cross(UP, towards))
+    corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3) - centre
+    aside = np.maximum(np.abs(corners @ right), np.abs(corners @ np.cross(towards, right)))
+    distance = (corners @ towards + MARGIN * aside / np.tan(np.radians(OUTSIDE_FOV) / 2)).max()
+    return Camera(_vec3(centre + towards * distance), _vec3(centre), fov=OUTSIDE_FOV)
+
+
+def _room_light(tracer: Tracer, camera: Camera, middle: Array) -> Spotlight:
+    """Under the ceiling over the middle, looking down and a little along the camera's view."""
+    height = _free_way(tracer, middle, UP[None])[0]
+    position = middle + UP * 0.9 * height
+    forward = camera.axes()[2]
+    aim = _unit(0.3 * forward - UP) if abs(forward[1]) < 0.99 else -UP
+    depth = _free_way(tracer, position, aim[None])[0]
+    depth = depth if depth > 0 else tracer.scene.geometry.diagonal
+    return Spotlight(_vec3(position), _vec3(position + aim * depth), fov=ROOM_LIGHT_FOV)
+
+
+def _outside_light(scene: Scene) -> Spotlight:
+    """Above the camera's side, aimed at the middle, with a cone that covers the bounds."""
+    centre, radius = scene.geometry.bounds.mean(axis=0), scene.geometry.diagonal / 2
+    side = np.subtract(scene.camera.position, centre) * (1, 0, 1)
+    length = np.linalg.norm(side)
+    side = side / length if length > 1e-6 * radius else np.array([0.0, 0.0, 1.0])
+    left = np.cross(UP, side)
+    direction = _unit(side - 0.5 * left + 1.2 * UP)
+    # 3 radii away the bounding sphere fills 39 degrees; at 4/3 of that the soft edge begins outside it.
+    fov = 2 * np.degrees(np.arcsin(1 / 3)) * 4 / 3
+    return Spotlight(_vec3(centre + direction * 3 * radius), _vec3(centre), fov=float(fov))
+
+
+def _lit(light: Spotlight, emission: float) -> Spotlight:
+    return replace(light, emission=(emission, emission, emission))
+
+
+def _distance_squared(scene: Scene) -> float:
+    return float((3 * scene.geometry.diagonal / 2) ** 2)
+
+
+def _with_emission(tracer: Tracer, camera: Camera, light: Spotlight) -> tuple[Spotlight, str]:
+    """The light with E for a mean irradiance of 1, and why; a light at the camera where the other lights nothing."""
+    mean = _mean_irradiance(tracer, camera, light)
+    if mean > 0:
+        return _lit(light, 1 / mean), "mean direct irradiance of what the camera sees is 1"
+    beside = Spotlight(camera.position, camera.look_at, fov=min(1.5 * camera.fov, 170.0))
+    mean = _mean_irradiance(tracer, camera, beside)
+    if mean > 0:
+        why = "at the camera, as a light elsewhere reached nothing that it sees; mean direct irradiance there is 1"
+        return _lit(beside, 1 / mean), why
+    return _lit(light, _distance_squared(tracer.scene)), "the camera sees nothing; E is irradiance 1 at the light's aim"
+
+
+def _mean_irradiance(tracer: Tracer, camera: Camera, light: Spotlight) -> float:
+    """Mean direct irradiance of what the camera sees under `light` with E = 1."""
+    directions = camera.rays((64, 64)).reshape(-1, 3)
+    hits = tracer.closest(np.tile(np.array(camera.position), (len(directions), 1)), directions)
+    position, normal = hits.position[hits.hit], hits.shading_normal[hits.hit]
+    if not len(position):
+        return 0.0
+    position = tracer.lift(position, hits.normal[hits.hit])
+    way = position - np.array(light.position)
+    distance = np.maximum(np.linalg.norm(way, axis=1), tracer.offset)
+    towards = way / distance[:, None]
+    intensity = np.maximum(towards @ light.axis, 0) * light.cone(towards)
+    cosine = np.maximum(-(normal * towards).sum(axis=1), 0)
+    visible = ~tracer.occluded(position, np.tile(np.array(light.position), (len(position), 1)))
+    return float((intensity * cosine * visible / distance**2).mean())

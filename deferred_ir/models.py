@@ -1,0 +1,259 @@
+"""Model files, of any format that trimesh reads, as world-space arrays with nothing merged or dropped."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import gltf, obj
+from .assets import Assets
+from .checks import LARGEST
+from .errors import SceneError
+from .materials import GREY, checked_albedo, linear_from_srgb, texture_from_image
+from .scene import Material, Texture
+from .typing import Array, Ints, Vec3
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One mesh of a file, placed in the world: arrays as in `Geometry`, of one material; uvs only with a texture."""
+
+    positions: Array
+    faces: Ints
+    material: Material
+    texture: Texture | None
+    normals: Array | None
+    uvs: Array | None
+    colors: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class ModelData:
+    """What one model file holds: its parts in file order, and notes on what is not honoured."""
+
+    name: str
+    parts: tuple[Part, ...]
+    notes: tuple[str, ...]
+
+
+def read(path: Path, scale: float = 1.0, translate: Vec3 = (0.0, 0.0, 0.0)) -> ModelData:
+    """Read a model file and place it: the file's own transforms, then `scale`, then `translate`.
+
+    Raises SceneError, one line with the file's name, where it is missing, broken, without triangles, or holds vertices
+    that are no numbers.
+    """
+    try:
+        data = path.read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        what = "is a folder" if path.is_dir() else getattr(error, "strerror", None) or error
+        raise SceneError(f"{path}: cannot be read: {what}; check the model's path") from error
+    return _Reader(path, data).read(scale, translate)
+
+
+class _Reader:
+    """Reads one file; knows what its format needs besides trimesh."""
+
+    def __init__(self, path: Path, data: bytes) -> None:
+        self.path = path
+        self.notes: list[str] = []
+        self.images: dict[str, str] = {}
+        self.base_colors: tuple[gltf.BaseColor, ...] | None = None
+        self.textures: dict[int, Texture] = {}
+        self.format = path.name.lower().rpartition(".")[2]
+        self.assets = Assets([path.parent])
+        if self.format in ("gltf", "glb"):
+            document = gltf.read(path, data)
+            data, self.assets, self.base_colors = document.text, document.assets, document.materials
+            self.notes += document.notes
+            self.format = "gltf"
+        elif self.format == "obj":
+            text = obj.read(path, data)
+            data, self.assets, self.images = text.text, text.assets, text.images
+            self.notes += text.notes
+        self.data = data
+
+    def read(self, scale: float, translate: Vec3) -> ModelData:
+        scene = self._load()
+        place = np.diag([scale, scale, scale, 1.0])
+        place[:3, 3] = translate
+        parts = []
+        for node in scene.graph.nodes_geometry:
+            matrix, name = scene.graph[node]
+            mesh = scene.geometry[name]
+            if len(getattr(mesh, "faces", ())):  # point clouds and curves have none
+                parts.append(self._part(mesh, place @ matrix))
+        if not parts:
+            raise SceneError(f"{self.path}: no triangles; give a model with a surface")
+        return ModelData(self.path.stem, tuple(parts), tuple(dict.fromkeys(self.notes)))
+
+    def _load(self) -> Any:
+        import trimesh
+
+        with warnings.catch_warnings():
+            # numpy 2.3 and older only warn where the text of an OBJ holds something other than numbers.
+            warnings.filterwarnings("error", "string or file could not be read", DeprecationWarning)
+            try:
+                return trimesh.load_scene(
+                    io.BytesIO(self.data), file_type=self.format, resolver=self.assets, process=False
+                )
+            except Exception as error:  # what a broken file makes trimesh raise depends on where it breaks
+                raise SceneError(f"{self.path}: {self._trouble(error)}") from error
+
+    def _trouble(self, error: Exception) -> str:
+        import trimesh
+
+        if self.format not in trimesh.available_formats() | {"gltf"}:
+            return f"no reader for files of type '{self.format}'; use .obj, .glb, .gltf, .ply or .stl"
+        if isinstance(error, KeyError) and isinstance(error.__cause__, type(None)) and self.format == "gltf":
+            return f"broken, or a file that it names is missing ({error}); export it again"
+        return f"broken or not a .{self.format} file ({' '.join(f'{type(error).__name__}: {error}'.split())})"
+
+    def _part(self, mesh: Any, matrix: Array) -> Part:
+        # Asked for before anything else: trimesh makes normals up once something wants them.
+        normals = np.array(mesh.vertex_normals) if "vertex_normals" in mesh._cache else None
+        vertices, faces = np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
+        if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+            raise SceneError(f"{self.path}: vertices are not three numbers each; export it again")
+        if faces.min() < 0 or faces.max() >= len(vertices):
+            raise SceneError(f"{self.path}: a face uses a vertex that does not exist; export it again")
+        material, texture, colors, uvs = self._appearance(mesh, len(vertices), len(faces))
+        if colors is not None and len(colors) == len(faces) and len(colors) != len(vertices):
+            # One colour a face: each face gets vertices of its own.
+            corners = faces.ravel()
+            vertices, faces = vertices[corners], np.arange(len(corners)).reshape(-1, 3)
+            normals = None if normals is None else normals[corners]
+            uvs, colors = (None if uvs is None else uvs[corners]), np.repeat(colors, 3, axis=0)
+        positions = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        self._check(positions)
+        linear = matrix[:3, :3] / max(float(np.abs(matrix[:3, :3]).max()), 1e-300)
+        if np.linalg.det(linear) < 0:
+            faces = faces[:, ::-1]
+        if normals is not None:
+            normals = _turned_normals(normals, linear)
+        return Part(positions, faces, material, texture, normals, uvs, colors)
+
+    def _check(self, positions: Array) -> None:
+        bad = int((~np.isfinite(positions).all(axis=1)).sum())
+        if bad:
+            raise SceneError(f"{self.path}: {bad} of {len(positions)} vertices are NaN or infinite; export it again")
+        if np.abs(positions).max() > LARGEST:
+            raise SceneError(f"{self.path}: vertices farther out than {LARGEST:g}; scale the model down")
+
+    def _appearance(
+        self, mesh: Any, vertices: int, faces: int
+    ) -> tuple[Material, Texture | None, Array | None, Array | None]:
+        """Material, texture, linear colours of vertices or faces, and texture coordinates."""
+        colors, uvs = self._colors(mesh), getattr(mesh.visual, "uv", None)
+        if colors is not None and len(colors) not in (vertices, faces):
+            self.notes.append(f"{self.path.name}: colours do not fit the vertices and are ignored")
+            colors = None
+        uvs = np.array(uvs, dtype=np.float64) if uvs is not None and len(uvs) == vertices else None
+        if uvs is not None and not np.isfinite(uvs).all():
+            self.notes.append(f"{self.path.name}: texture coordinates that are NaN or infinite are taken as 0")
+            uvs[~np.isfinite(uvs)] = 0
+        source = getattr(mesh.visual, "material", None)
+        name, albedo, image, image_name = self._reflectance(source, colored=colors is not None)
+        if image is not None and uvs is None:
+            self.notes.append(f"{self.path.name}: no texture coordinates for {image_name}; its plain colour is taken")
+            image = None
+        elif image is not None and self.base_colors is None:
+            albedo = (1.0, 1.0, 1.0)  # map_Kd replaces Kd; glTF multiplies
+        if image is None:
+            return Material(name, albedo), None, colors, None
+        texture = self.textures.get(id(image))
+        if texture is None:
+            texture = texture_from_image(image, image_name, self.notes)
+            self.textures[id(image)] = texture
+        return Material(name, albedo), texture, colors, uvs
+
+    def _reflectance(self, source: Any, colored: bool) -> tuple[str, Vec3, Any, str]:
+        """A trimesh material's name, albedo, image (or None) and the image's name."""
+        if source is not None and self.base_colors is not None:
+            base = self.base_colors[int(source.name)]
+            where = f"{self.path}: material {base.name}"
+            image = source.baseColorTexture
+            if base.image is not None and image is None:
+                raise SceneError(f"{where}: image {base.image} is missing or not readable; put it next to the model")
+            return base.name, checked_albedo(base.factor, where, self.notes), image, base.image or ""
+        plain = (1.0, 1.0, 1.0) if colored else GREY
+        if source is None:
+            return "default", plain, None, ""
+        where = f"{self.path}: material {source.name}"
+        if hasattr(source, "baseColorFactor"):  # formats that trimesh turns into PBR materials: 8 bits are what it has
+            factor = source.baseColorFactor
+            albedo = plain if factor is None else checked_albedo(np.divide(factor[:3], 255), where, self.notes)
+            return source.name, albedo, source.baseColorTexture, f"texture of {source.name}"
+        return self._simple_reflectance(source, where, plain)
+
+    def _simple_reflectance(self, source: Any, where: str, plain: Vec3) -> tuple[str, Vec3, Any, str]:
+        image = getattr(source, "image", None)
+        if image is not None and image.format is None:
+            image = None  # not from a file: trimesh's filler where there is no material
+        wanted = self.images.get(source.name, "") if self.format == "obj" else self._ply_image()
+        if wanted and image is None:
+            state = "not a readable image" if self.assets.path(wanted) else "missing"
+            raise SceneError(f"{where}: image {wanted} is {state}; put it next to the model or take it out")
+        values = getattr(source, "kwargs", {})
+        if self.format == "obj" and values and "kd" not in values and image is None:
+            self.notes.append(f"{self.path.name}: material {source.name} has no Kd that can be read; it is grey")
+        if any(_is_above_zero(word) for word in np.ravel(values.get("ke", ()))):
+            self.notes.append(f"{self.path.name}: emission (Ke) is ignored")
+        albedo = checked_albedo(values["kd"], where, self.notes) if "kd" in values else plain
+        return source.name, albedo, image, wanted or f"texture of {source.name}"
+
+    def _ply_image(self) -> str:
+        """The image that a PLY file's header names."""
+        if self.format != "ply":
+            return ""
+        header = self.data.partition(b"end_header")[0].decode("latin-1")
+        for line in header.splitlines():
+            words = line.split(maxsplit=2)
+            if len(words) == 3 and words[0] == "comment" and words[1].lower() == "texturefile":
+                return words[2].strip()
+        return ""
+
+    def _colors(self, mesh: Any) -> Array | None:
+        """Linear colours of vertices, else of faces, float64 (n, 3), if the file has any."""
+        kind = getattr(mesh.visual, "kind", None)
+        if kind in ("vertex", "face"):
+            return linear_from_srgb(np.asarray(getattr(mesh.visual, f"{kind}_colors"))[:, :3] / 255)
+        stored = getattr(mesh.visual, "vertex_attributes", {}).get("color")
+        if stored is None:
+            stored = mesh.vertex_attributes.get("color")
+        if stored is None:
+            return None
+        raw = np.asarray(stored)
+        values = raw[:, :3].astype(np.float64)
+        if raw.dtype.kind in "iu":
+            values /= np.iinfo(raw.dtype).max
+        if not np.isfinite(values).all() or values.min() < 0:
+            raise SceneError(f"{self.path}: vertex colours must be finite and 0 or more; export it again")
+        if self.base_colors is not None:
+            return np.clip(values, 0, 1)
+        return linear_from_srgb(values / 255 if values.max() > 1 else values)
+
+
+def _is_above_zero(word: Any) -> bool:
+    try:
+        return float(word) > 0
+    except ValueError:
+        return False
+
+
+def _turned_normals(normals: Array, linear: Array) -> Array:
+    """Unit normals (n, 3), turned by the inverse transpose of `linear`; a zero row where there is none."""
+    # The cofactor matrix is the inverse transpose times the determinant, and also serves flattened models.
+    a, b, c = linear
+    cofactor = np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
+    turned = normals @ cofactor.T * (np.sign(np.linalg.det(linear)) or 1.0)
+    size = np.abs(turned).max(axis=1, keepdims=True)
+    usable = np.isfinite(size) & (size > 0)
+    scaled = np.divide(turned, size, out=np.zeros_like(turned), where=usable)
+    length = np.linalg.norm(scaled, axis=1, keepdims=True)
+    unit: Array = np.divide(scaled, length, out=np.zeros_like(scaled), where=usable)
+    return unit

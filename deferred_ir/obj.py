@@ -1,0 +1,108 @@
+"""What trimesh passes over in OBJ and MTL files, mended before it reads them.
+
+trimesh knows one `mtllib`, finds the word even in a comment, counts negative indices from the end of the whole file,
+and skips missing materials and images without a word.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from .assets import Assets, without_options
+from .errors import SceneError
+
+MATERIALS = "materials.mtl"
+"""Name under which all materials of a model are handed to trimesh."""
+
+
+@dataclass(frozen=True)
+class ObjFile:
+    """An OBJ file made ready: text for trimesh, its assets, the image each material names, and notes."""
+
+    text: bytes
+    assets: Assets
+    images: dict[str, str]
+    notes: tuple[str, ...]
+
+
+def read(path: Path, data: bytes) -> ObjFile:
+    """Make the OBJ file `data` at `path` ready for trimesh; all its material libraries become one."""
+    text = _decoded(data)
+    assets = Assets([path.parent])
+    materials, notes = [], []
+    for names in re.findall(r"^[ \t]*mtllib[ \t]+(.*)", text, re.MULTILINE):
+        for name in _library_names(names.strip(), assets):
+            found = assets.path(name)
+            if found is None:
+                notes.append(f"{path.name}: its material file {name} is missing")
+                continue
+            materials.append(_decoded(found.read_bytes()))
+            if found.parent not in assets.folders:
+                assets.folders.append(found.parent)
+    mtl = "\n".join(materials)
+    assets.blobs[MATERIALS] = mtl.encode()
+    defined = {" ".join(name.split()) for name in re.findall(r"^\s*newmtl[ \t]+(.*)", mtl, re.MULTILINE)}
+    used = {" ".join(name.split()) for name in re.findall(r"^usemtl[ \t]+(.*)", text, re.MULTILINE)}
+    if missing := sorted(used - defined):
+        notes.append(f"{path.name}: no material {', '.join(missing)}; its surfaces are grey")
+    text = re.sub(r"^.*\bmtllib\b.*$", "", text, flags=re.MULTILINE)
+    text = f"mtllib {MATERIALS}\n{_with_absolute_indices(text)}"
+    if re.search(r"^f[^\n#]*[ \t/](0+|-\d+)(?![\d.])", text, re.MULTILINE):
+        raise SceneError(
+            f"{path}: a face has index 0, or one before the first vertex; export it again, counting from 1"
+        )
+    return ObjFile(text.encode(), assets, _images(mtl), tuple(notes))
+
+
+def _decoded(data: bytes) -> str:
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _library_names(names: str, assets: Assets) -> list[str]:
+    """The files of one `mtllib` line: one name with spaces, or several names."""
+    return [names] if assets.path(names) or " " not in names else names.split()
+
+
+def _images(mtl: str) -> dict[str, str]:
+    """The file name in the map_Kd of each material that has one."""
+    images, material = {}, ""
+    for line in mtl.splitlines():
+        key, *rest = line.split(maxsplit=1) or [""]
+        if rest and key.lower() == "newmtl":
+            material = " ".join(rest[0].split())
+        elif rest and key.lower() == "map_kd":
+            images[material] = without_options(rest[0]).strip()
+    return images
+
+
+def _with_absolute_indices(text: str) -> str:
+    """The text with negative face indices, which count back from the latest vertex, turned into plain ones."""
+    if not re.search(r"^[ \t]*f[^\n#]*[ \t/]-\d", text, re.MULTILINE):
+        return text
+    counts = {"v": 0, "vt": 0, "vn": 0}
+    lines = text.split("\n")
+    for number, line in enumerate(lines):
+        words = line.split()
+        if not words:
+            continue
+        if words[0] in counts:
+            counts[words[0]] += 1
+        elif words[0] == "f":
+            totals = tuple(counts.values())
+            lines[number] = " ".join(["f", *(_absolute(word, totals) for word in words[1:])])
+    return "\n".join(lines)
+
+
+def _absolute(reference: str, totals: tuple[int, ...]) -> str:
+    """One vertex of a face, such as `-4/-4/-1`, with the numbers of vertices, uvs and normals so far."""
+    parts = reference.split("/")
+    for place, (part, total) in enumerate(zip(parts, totals, strict=False)):
+        if re.fullmatch(r"-\d+", part):
+            parts[place] = str(total + 1 + int(part))
+    return "/".join(parts)

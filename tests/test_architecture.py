@@ -14,7 +14,11 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 FOLDERS = PROJECT["tool"]["setuptools"]["package-dir"]
 SHADERS = {".glsl", ".vert", ".frag", ".geom", ".comp"}
 LONGEST = 350
-OPEN_TO_PASSES = {"graph", "params", "gl", "camera", "lights", "tracing", "timing", "sampling", "errors", "typing"}
+OPEN_TO_PASSES = {
+    *("graph", "params", "gl", "camera", "lights", "tracing", "timing", "sampling", "errors", "typing"),
+    *("frame", "io", "maps", "vpls"),
+}
+CLOSED_TO_PASSES = {"renderer", "executor", "config", "cli", "doctor", "viewer"}
 
 
 def modules():
@@ -73,6 +77,15 @@ def test_the_library_reaches_passes_in_one_place_only(name):
 def test_a_pass_knows_the_tools_but_neither_the_renderer_nor_another_pass(name):
     ours = [module.removeprefix("deferred_ir.") for module in imports(name) if module.startswith("deferred_ir")]
     assert {module.partition(".")[0] for module in ours} <= OPEN_TO_PASSES
+
+
+@pytest.mark.parametrize("name", PASSES)
+def test_a_pass_does_not_reach_the_renderer_through_others_either(name):
+    reached, ahead = set(), {name}
+    while ahead:
+        reached |= ahead
+        ahead = {module for known in ahead for module in imports(known) if module in MODULES} - reached
+    assert not {f"deferred_ir.{module}" for module in CLOSED_TO_PASSES} & reached
 
 
 @pytest.mark.parametrize("name", ["deferred_ir.graph", "deferred_ir.params"])

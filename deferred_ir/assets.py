@@ -35,7 +35,7 @@ class Assets(Mapping[str, bytes]):
             return self.blobs[name]
         path = self.path(name)
         if path is None:
-            raise KeyError(name)
+            raise FileNotFoundError(f"{name} is missing")
         return path.read_bytes()
 
     def __iter__(self) -> Iterator[str]:

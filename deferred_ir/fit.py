@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 UP = np.array([0.0, 1.0, 0.0])
 ENCLOSED = 0.75
 """A point is inside where this part of the rays from it meets a surface: an open side of a box (5/6) still counts."""
+ROOMY = 0.03
+"""A point with a surface nearer than this part of the scene's diagonal is a gap between things and no room."""
 SOLID = 0.95
 """A point is within a solid where this part of the surfaces around it shows it their backs."""
 INSIDE_FOV, OUTSIDE_FOV, ROOM_LIGHT_FOV = 75.0, 45.0, 120.0
@@ -49,8 +51,8 @@ def fitted(scene: Scene, camera: bool, spotlight: bool) -> Scene:
         scene = replace(scene, camera=view)
         chosen["camera"] = _plain(view, why)
     if spotlight:
-        light = _outside_light(scene) if middle is None else _room_light(tracer, scene.camera, middle)
-        light, why = _with_emission(tracer, scene.camera, light)
+        lights = [_outside_light(scene)] if middle is None else _room_lights(tracer, scene.camera, middle)
+        light, why = _brightest(tracer, scene.camera, lights)
         scene = replace(scene, spotlight=light)
         chosen["spotlight"] = _plain(light, why)
     return replace(scene, chosen=chosen)
@@ -113,7 +115,8 @@ def _clearances(tracer: Tracer, points: Array) -> Array:
     enclosed = hit.mean(axis=1) >= ENCLOSED
     solid = (facing < 0).sum(axis=1) >= SOLID * np.maximum(hit.sum(axis=1), 1)
     nearer = np.sort(way, axis=1)[:, len(directions) // 10]
-    clearances: Array = np.where(enclosed & ~solid, nearer, -1.0)
+    roomy = nearer >= ROOMY * tracer.scene.geometry.diagonal
+    clearances: Array = np.where(enclosed & ~solid & roomy, nearer, -1.0)
     return clearances
 
 
@@ -181,15 +184,21 @@ def _outside_camera(scene: Scene) -> Camera:
     return Camera(_vec3(centre + towards * distance), _vec3(centre), fov=OUTSIDE_FOV)
 
 
-def _room_light(tracer: Tracer, camera: Camera, middle: Array) -> Spotlight:
-    """Under the ceiling over the middle, looking down and a little along the camera's view."""
-    height = _free_way(tracer, middle, UP[None])[0]
-    position = middle + UP * 0.9 * height
-    forward = camera.axes()[2]
+def _room_lights(tracer: Tracer, camera: Camera, middle: Array) -> list[Spotlight]:
+    """Lights at several places in the air, looking down and a little along the camera's view."""
+    position, forward = np.array(camera.position), camera.axes()[2]
+    way = _free_way(tracer, position, forward[None])[0]
+    grounds = [middle, *(position + forward * way * part for part in (0.25, 0.5, 0.75))]
     aim = _unit(0.3 * forward - UP) if abs(forward[1]) < 0.99 else -UP
-    depth = _free_way(tracer, position, aim[None])[0]
-    depth = depth if depth > 0 else tracer.scene.geometry.diagonal
-    return Spotlight(_vec3(position), _vec3(position + aim * depth), fov=ROOM_LIGHT_FOV)
+    lights = []
+    for ground in grounds:
+        height = _free_way(tracer, ground, UP[None])[0]
+        for part in (0.9, 0.6, 0.3):
+            place = ground + UP * part * max(height, 0.0)
+            lights.append(
+                Spotlight(_vec3(place), _vec3(place + aim * tracer.scene.geometry.diagonal / 4), fov=ROOM_LIGHT_FOV)
+            )
+    return lights
 
 
 def _outside_light(scene: Scene) -> Spotlight:
@@ -213,31 +222,45 @@ def _distance_squared(scene: Scene) -> float:
     return float((3 * scene.geometry.diagonal / 2) ** 2)
 
 
-def _with_emission(tracer: Tracer, camera: Camera, light: Spotlight) -> tuple[Spotlight, str]:
-    """The light with E for a mean irradiance of 1, and why; a light at the camera where the other lights nothing."""
-    mean = _mean_irradiance(tracer, camera, light)
-    if mean > 0:
-        return _lit(light, 1 / mean), "mean direct irradiance of what the camera sees is 1"
-    beside = Spotlight(camera.position, camera.look_at, fov=min(1.5 * camera.fov, 170.0))
-    mean = _mean_irradiance(tracer, camera, beside)
-    if mean > 0:
-        why = "at the camera, as a light elsewhere reached nothing that it sees; mean direct irradiance there is 1"
-        return _lit(beside, 1 / mean), why
-    return _lit(light, _distance_squared(tracer.scene)), "the camera sees nothing; E is irradiance 1 at the light's aim"
+def _brightest(tracer: Tracer, camera: Camera, lights: list[Spotlight]) -> tuple[Spotlight, str]:
+    """The one of `lights` that lights most of what the camera sees, with E for a mean irradiance of 1, and why.
+
+    Where none lights anything, a light at the camera does.
+    """
+    lit = _best(tracer, camera, lights)
+    if lit is not None:
+        return lit, "mean direct irradiance of what the camera sees is 1"
+    lit = _best(tracer, camera, [Spotlight(camera.position, camera.look_at, fov=min(1.5 * camera.fov, 170.0))])
+    if lit is not None:
+        return lit, "at the camera, as lights elsewhere reach nothing that it sees; mean irradiance of that is 1"
+    return _lit(lights[0], _distance_squared(tracer.scene)), "the camera sees nothing; E fits the scene's size"
 
 
-def _mean_irradiance(tracer: Tracer, camera: Camera, light: Spotlight) -> float:
-    """Mean direct irradiance of what the camera sees under `light` with E = 1."""
+def _best(tracer: Tracer, camera: Camera, lights: list[Spotlight]) -> Spotlight | None:
+    best, best_spread = None, 0.0
     directions = camera.rays((64, 64)).reshape(-1, 3)
     hits = tracer.closest(np.tile(np.array(camera.position), (len(directions), 1)), directions)
-    position, normal = hits.position[hits.hit], hits.shading_normal[hits.hit]
-    if not len(position):
-        return 0.0
-    position = tracer.lift(position, hits.normal[hits.hit])
-    way = position - np.array(light.position)
+    if not hits.hit.any():
+        return None
+    points = tracer.lift(hits.position[hits.hit], hits.normal[hits.hit])
+    for light in lights:
+        irradiance = _irradiance(tracer, points, hits.shading_normal[hits.hit], light)
+        mean, square = float(irradiance.mean()), float((irradiance**2).mean())
+        # 1 for even light, 0 for all of it in one spot.
+        spread = mean**2 / square if square > 0 else 0.0
+        if spread > best_spread:
+            best, best_spread = _lit(light, 1 / mean), spread
+    return best
+
+
+def _irradiance(tracer: Tracer, points: Array, normals: Array, light: Spotlight) -> Array:
+    """Direct irradiance (n,) at `points` (n, 3) under `light` with E = 1, shadows included."""
+    origin = np.array(light.position)
+    way = points - origin
     distance = np.maximum(np.linalg.norm(way, axis=1), tracer.offset)
     towards = way / distance[:, None]
     intensity = np.maximum(towards @ light.axis, 0) * light.cone(towards)
-    cosine = np.maximum(-(normal * towards).sum(axis=1), 0)
-    visible = ~tracer.occluded(position, np.tile(np.array(light.position), (len(position), 1)))
-    return float((intensity * cosine * visible / distance**2).mean())
+    cosine = np.maximum(-(normals * towards).sum(axis=1), 0)
+    visible = ~tracer.occluded(points, np.tile(origin, (len(points), 1)))
+    irradiance: Array = intensity * cosine * visible / distance**2
+    return irradiance

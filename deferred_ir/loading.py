@@ -10,6 +10,7 @@ from . import fit, merging, models, scene_file
 from .camera import Camera
 from .errors import SceneError, did_you_mean
 from .lights import Spotlight
+from .models import ModelData
 from .scene import Scene
 from .scene_file import ModelEntry, SceneFile
 
@@ -31,7 +32,10 @@ def load(scene: str | os.PathLike[str]) -> Scene:
     path = _found(os.fspath(scene))
     is_scene_file = path.suffix.lower() == ".toml"
     described = scene_file.read(path) if is_scene_file else SceneFile(path.stem, (ModelEntry(path),))
-    read = [(models.read(entry.path, entry.scale, entry.translate), entry.motion) for entry in described.models]
+    read = [
+        (_model(entry, path, index, len(described.models)), entry.motion)
+        for index, entry in enumerate(described.models)
+    ]
     geometry, materials, textures, ranges = merging.merge(read, str(path))
     notes = tuple(dict.fromkeys(note for model, _ in read for note in model.notes))
     result = Scene(
@@ -47,6 +51,17 @@ def load(scene: str | os.PathLike[str]) -> Scene:
         notes=notes,
     )
     return fit.fitted(result, camera=described.camera is None, spotlight=described.spotlight is None)
+
+
+def _model(entry: ModelEntry, path: Path, index: int, count: int) -> ModelData:
+    """The model of an entry; an error says which entry of which scene file names it."""
+    try:
+        return models.read(entry.path, entry.scale, entry.translate)
+    except SceneError as error:
+        if entry.path == path:
+            raise
+        key = "model.path" if count == 1 else f"model[{index}].path"
+        raise SceneError(f"{path}: {key}: {error}") from error
 
 
 def _folder() -> Path:

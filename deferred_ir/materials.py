@@ -56,19 +56,23 @@ def texture_from_image(image: Any, name: str, notes: list[str]) -> Texture:
     """A PIL image of any kind as 8-bit RGB. Raises SceneError where its file is broken."""
     try:
         image.load()
+        pixels = _rgb(image)
     except Exception as error:  # PIL's decoders raise many kinds; each means that the file is broken
-        raise SceneError(f"{name}: not a readable image ({error}); replace the file") from error
+        raise SceneError(f"{name}: not a readable image ({' '.join(str(error).split())}); replace the file") from error
     if "A" in image.getbands() or "transparency" in image.info:
         notes.append(f"{name}: transparency is ignored")
+    return Texture(name, pixels)
+
+
+def _rgb(image: Any) -> Any:
+    """Pixels of a PIL image, uint8 (H, W, 3)."""
     if image.mode.startswith("I") or image.mode == "F":
         # PIL would clip these to 255; 16 bits are what PNG and TIFF store in them, floats run to 1.
         values = np.asarray(image, dtype=np.float64) / (1.0 if image.mode == "F" else 65535.0)
         grey = np.round(np.clip(values, 0, 1) * 255).astype(np.uint8)
-        pixels = np.repeat(grey[:, :, None], 3, axis=2)
-    else:
-        # By way of RGBA, palettes with transparency keep their colours.
-        pixels = np.array(image.convert("RGBA"))[:, :, :3]
-    return Texture(name, np.ascontiguousarray(pixels))
+        return np.repeat(grey[:, :, None], 3, axis=2)
+    # By way of RGBA, palettes with transparency keep their colours.
+    return np.ascontiguousarray(np.array(image.convert("RGBA"))[:, :, :3])
 
 
 def albedo(scene: Scene, faces: Ints, weights: Array) -> Array:

@@ -107,11 +107,12 @@ class _Reader:
     def _trouble(self, error: Exception) -> str:
         import trimesh
 
-        if self.format not in trimesh.available_formats() | {"gltf"}:
+        if self.format not in trimesh.available_formats():
             return f"no reader for files of type '{self.format}'; use .obj, .glb, .gltf, .ply or .stl"
-        if isinstance(error, KeyError) and isinstance(error.__cause__, type(None)) and self.format == "gltf":
-            return f"broken, or a file that it names is missing ({error}); export it again"
-        return f"broken or not a .{self.format} file ({' '.join(f'{type(error).__name__}: {error}'.split())})"
+        if isinstance(error, FileNotFoundError):
+            return f"{error}; put it next to the model"
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        return f"broken, or no {self.path.suffix} file ({what}); export it again"
 
     def _part(self, mesh: Any, matrix: Array) -> Part:
         # Asked for before anything else: trimesh makes normals up once something wants them.

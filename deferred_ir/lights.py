@@ -17,21 +17,20 @@ LIGHT = np.dtype(
     [
         ("position", "f4", 3),
         ("one_minus_cos", "f4"),  # 1 - cos of the half cone angle, without cancellation
-        (
-            "x_axis",
-            "f4",
-            3,
-        ),  # right and up, divided by tan(half angle): NDC = dot(d, axis) / dot(d, z)
+        ("x_axis", "f4", 3),  # right and up, divided by tan(half angle): NDC = dot(d, axis) / dot(d, z)
         ("tan_half", "f4"),
         ("y_axis", "f4", 3),
-        ("near", "f4"),
+        ("clamp_squared", "f4"),  # of VPLs: 1/d^2 is taken as 1/max(d^2, this)
         ("z_axis", "f4", 3),  # unit; where the light looks
-        ("tile", "f4"),  # number of its tile in the atlas; the spotlight's (-1) is a whole layer
+        ("tile", "f4"),  # number of its tile in the atlas; the spotlight's (SPOT_TILE) is a whole layer
         ("emission", "f4", 3),
         ("unused", "f4"),
     ]
 )
-"""One light in a std140 uniform block; `shaders/lib/light.glsl` declares the same five vec4."""
+"""One light in a std140 uniform block; shaders/lib/light.glsl declares the same five vec4."""
+
+LIGHTS_PER_BLOCK = 192
+"""Lights in a uniform block: OpenGL promises 16 KiB (204 lights), and blocks must start at multiples of 256 bytes."""
 
 NEAR = 1e-4
 """Near planes of camera and lights, as a fraction of the scene's diagonal."""
@@ -88,13 +87,13 @@ def frames(axes: Array) -> tuple[Array, Array]:
     return right, up
 
 
-def light_records(position: Array, axis: Array, emission: Array, *, fov: float, near: float, tile: Array) -> np.ndarray:
+def light_records(position: Array, axis: Array, emission: Array, *, fov: float, tile: Array | float) -> np.ndarray:
     """Pack lights with one cone angle `fov` (degrees) into LIGHT records, shape (n,). Inputs are (n, 3), tile (n,)."""
     records = np.zeros(len(position), dtype=LIGHT)
     right, up = frames(axis)
     tangent = np.tan(np.radians(fov) / 2)
     records["position"], records["z_axis"], records["emission"] = position, axis, emission
     records["x_axis"], records["y_axis"] = right / tangent, up / tangent
-    records["tan_half"], records["one_minus_cos"], records["near"] = tangent, one_minus_cos(fov), near
+    records["tan_half"], records["one_minus_cos"] = tangent, one_minus_cos(fov)
     records["tile"] = tile
     return records

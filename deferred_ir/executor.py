@@ -1,0 +1,136 @@
+"""Runs plans: allocates what `graph.compile` planned, binds each pass's ports by name, and times the passes.
+
+Resources are kept by (pass, port, description) and survive a new plan that still has them; programs are kept by source
+and defines.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+from .errors import DeviceError
+from .frame import FRAME, Frame
+from .gl.gpu import Gpu
+from .gl.resources import Framebuffer, GpuBuffer, GpuTexture
+from .gl.shaders import ShaderLibrary
+from .gl.timers import Timers
+from .graph import Buffer, Description, Plan, Texture
+from .io import Io, Resource
+
+FRAME_BLOCK = 0
+
+
+class Executor:
+    """Owns what a plan needs on the GPU. `counters` holds what the passes published in the last frame."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self.gpu = gpu
+        self.library = ShaderLibrary(gpu)
+        self.counters: Counter[str] = Counter()
+        self._frame_block = gpu.ctx.buffer(reserve=FRAME.itemsize, dynamic=True)
+        self._resources: dict[tuple[str, str, Description, tuple[int, int] | None], Resource] = {}
+        self._framebuffers: list[Framebuffer] = []
+        self._plan: Plan | None = None
+        self._size = (0, 0)
+        self._ios: list[Io] = []
+
+    def run(self, plan: Plan, frame: Frame, timers: Timers | None = None) -> None:
+        """Draw one frame; timers get a lap for each pass."""
+        if plan is not self._plan or frame.size != self._size:
+            self._allocate(plan, frame.size)
+        self.counters.clear()
+        self._frame_block.write(frame.block())
+        self._frame_block.bind_to_uniform_block(FRAME_BLOCK)
+        frame.buffers.bind()
+        for step, io in zip(plan.steps, self._ios, strict=True):
+            self.gpu.reset()
+            io.bind()
+            if timers:
+                timers.mark(step.name)
+            step.work.execute(frame, io)
+
+    def resource(self, source: tuple[str, str]) -> Any:
+        """What (pass, port) wrote in the last frame."""
+        found = next((r for key, r in self._resources.items() if key[:2] == source), None)
+        if found is None:
+            raise KeyError(f"{source[0]}.{source[1]} is not in the plan")
+        return found
+
+    def memory(self) -> dict[str, int]:
+        """Bytes of this executor's textures and buffers."""
+        textures = sum(r.nbytes for r in self._all() if isinstance(r, GpuTexture))
+        buffers = sum(r.nbytes for r in self._all() if isinstance(r, GpuBuffer))
+        return {"textures": textures, "buffers": buffers + self._frame_block.size}
+
+    def _all(self) -> list[GpuTexture | GpuBuffer]:
+        return [single for r in self._resources.values() for single in (r if isinstance(r, list) else [r])]
+
+    def _allocate(self, plan: Plan, size: tuple[int, int]) -> None:
+        """Make the plan's resources and framebuffers; what the last plan had and this one has stays."""
+        self._plan = None  # if an allocation fails, the next frame starts over
+        keys = {
+            (step.name, port, output.description, _size(output.description, size))
+            for step in plan.steps
+            for port, output in step.outputs.items()
+        }
+        for framebuffer in self._framebuffers:
+            framebuffer.release()
+        self._framebuffers, self._ios = [], []
+        for key in [key for key in self._resources if key not in keys]:
+            _release(self._resources.pop(key))
+        for key in sorted(keys - self._resources.keys(), key=lambda key: key[:2]):
+            try:
+                self._resources[key] = self._make(key[2], size)
+            except DeviceError as error:
+                raise DeviceError(f"{key[0]}.{key[1]}: {error}") from error
+        ports = {key[:2]: resource for key, resource in self._resources.items()}
+        written = {(s.name, port): output.defines for s in plan.steps for port, output in s.outputs.items()}
+        for step in plan.steps:
+            inputs = {port: ports[source] if source else None for port, source in step.sources.items()}
+            outputs = {port: ports[step.name, port] for port in step.outputs}
+            io = Io(self.library, step, {**inputs, **outputs}, written, self.counters)
+            attached = {port: inputs[port] for port, declared in step.work.inputs.items() if declared.attach}
+            targets = {port: r for port, r in {**outputs, **attached}.items() if isinstance(r, GpuTexture)}
+            if targets:
+                io.framebuffer = Framebuffer(self.gpu, targets, step.name)
+                self._framebuffers.append(io.framebuffer)
+            self._ios.append(io)
+        self._plan, self._size = plan, size
+
+    def _make(self, description: Description, size: tuple[int, int]) -> Resource:
+        if isinstance(description, Buffer):
+            return GpuBuffer(self.gpu, description)
+        if description.layers > self.gpu.max_layers:
+            raise DeviceError(
+                f"{description.layers} layers, and this driver takes {self.gpu.max_layers}; "
+                "use fewer VPLs or smaller maps"
+            )
+        width_height = description.size or size
+        if max(width_height) > self.gpu.max_size:
+            raise DeviceError(
+                f"{width_height[0]}x{width_height[1]} pixels, and this driver draws at most {self.gpu.max_size}; "
+                "use a smaller size"
+            )
+        if description.copies:
+            return [GpuTexture(self.gpu, description, width_height) for _ in range(description.copies)]
+        return GpuTexture(self.gpu, description, width_height)
+
+    def release(self) -> None:
+        """Give everything back."""
+        for framebuffer in self._framebuffers:
+            framebuffer.release()
+        for resource in self._resources.values():
+            _release(resource)
+        self._frame_block.release()
+        self.library.release()
+
+
+def _size(description: Description, frame: tuple[int, int]) -> tuple[int, int] | None:
+    """The frame's size where the resource depends on it."""
+    return frame if isinstance(description, Texture) and description.size is None else None
+
+
+def _release(resource: Resource) -> None:
+    for single in resource if isinstance(resource, list) else [resource]:
+        single.release()

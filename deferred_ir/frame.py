@@ -1,0 +1,53 @@
+"""One frame: what passes are told about it, and the uniform block in which shaders read it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .gl.scene_buffers import SceneBuffers
+from .lights import NEAR
+from .scene import Scene
+from .tracing import Tracer
+from .typing import Vec3
+
+FRAME = np.dtype(
+    [
+        ("camera", "f4", 3),
+        ("near", "f4"),  # near plane of the camera and of all lights
+        ("ray", "f4", (3, 4)),  # a, b, c of Camera.ray_axes: a point at view depth 1 is camera + a x + b y + c
+        ("clip", "f4", (3, 4)),  # rows that take a point relative to the camera to clip x, clip y and view depth
+    ]
+)
+"""Written to uniform block 0; shaders/lib/frame.glsl declares the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What a pass may know of a frame. `scene` has camera and light at `time` [s]; `buffers` is it on the GPU."""
+
+    size: tuple[int, int]
+    scene: Scene
+    buffers: SceneBuffers
+    tracer: Callable[[], Tracer]
+    seed: int = 0
+    time: float = 0.0
+
+    @property
+    def near(self) -> float:
+        """Near plane of the camera and of all lights, in world units."""
+        return NEAR * self.scene.geometry.diagonal
+
+    def block(self) -> bytes:
+        """The FRAME record."""
+        record = np.zeros((), FRAME)
+        camera = self.scene.camera
+        rays = camera.ray_axes(self.size)
+        position: Vec3 = camera.position
+        record["camera"], record["near"] = position, self.near
+        record["ray"][:, :3] = rays
+        # Axes are orthogonal, so dividing by the squared length inverts them; forward has length 1.
+        record["clip"][:, :3] = rays / (rays**2).sum(axis=1, keepdims=True)
+        return record.tobytes()

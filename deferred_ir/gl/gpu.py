@@ -1,0 +1,62 @@
+"""One OpenGL context with what every user of it needs: moderngl's view, the raw functions, limits and samplers."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+from . import devices, raw
+
+
+class Gpu:
+    """A context on a device (see devices.create_context), current in the thread that made it. Close it when done."""
+
+    def __init__(self, device: str = "auto") -> None:
+        self.ctx, self._loader, self.device = devices.create_context(device)
+        self.gl = raw.GL(self._loader)
+        extensions = self.ctx.extensions
+        self.layer_from_vertex = "GL_ARB_shader_viewport_layer_array" in extensions
+        self.clip_control = "GL_ARB_clip_control" in extensions or self.ctx.version_code >= 450
+        if self.clip_control:
+            self.gl.ClipControl(raw.LOWER_LEFT, raw.ZERO_TO_ONE)
+        self._samplers: dict[tuple[bool, str | None, bool], Any] = {}
+
+    @cached_property
+    def max_size(self) -> int:
+        """Largest width or height of a render target."""
+        texture = self.gl.integers(raw.MAX_TEXTURE_SIZE)
+        return min(*texture, *self.gl.integers(raw.MAX_VIEWPORT_DIMS, 2))
+
+    @cached_property
+    def max_layers(self) -> int:
+        """Most layers of an array texture."""
+        return self.gl.integers(raw.MAX_ARRAY_LAYERS)[0]
+
+    @property
+    def defines(self) -> dict[str, int]:
+        """What every shader must know of the driver."""
+        return {"CLIP_CONTROL": int(self.clip_control), "LAYER_FROM_VERTEX": int(self.layer_from_vertex)}
+
+    def sampler(self, linear: bool, compare: str | None = None, repeat: bool = False) -> Any:
+        """A sampler object, shared: filter and comparison belong to the reader, never to the texture."""
+        key = (linear, compare, repeat)
+        if key not in self._samplers:
+            name = self.ctx.LINEAR if linear else self.ctx.NEAREST
+            sampler = self.ctx.sampler(repeat_x=repeat, repeat_y=repeat, filter=(name, name))
+            if compare:
+                sampler.compare_func = compare
+            self._samplers[key] = sampler
+        return self._samplers[key]
+
+    def reset(self) -> None:
+        """The state that each pass starts from: no tests, no blending, all writes on."""
+        ctx = self.ctx
+        ctx.disable(ctx.DEPTH_TEST | ctx.CULL_FACE | ctx.BLEND)
+        self.gl.DepthMask(1)
+        self.gl.ColorMask(1, 1, 1, 1)
+
+    def close(self) -> None:
+        """Destroy the context and all that lives in it."""
+        for sampler in self._samplers.values():
+            sampler.release()
+        devices.close(self.ctx, self._loader)

@@ -1,0 +1,92 @@
+"""OpenGL functions that moderngl does not have, called by name through ctypes: `gl.BindTexture(target, name)`."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from ..errors import DeviceError
+from .devices import Loader
+
+_U, _I, _F, _P = ctypes.c_uint, ctypes.c_int, ctypes.c_float, ctypes.c_void_p
+_SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
+    "ActiveTexture": (None, _U),
+    "BindFramebuffer": (None, _U, _U),
+    "BindTexture": (None, _U, _U),
+    "CheckFramebufferStatus": (_U, _U),
+    "ClearBufferfv": (None, _U, _I, _P),
+    "ClearBufferuiv": (None, _U, _I, _P),
+    "ClipControl": (None, _U, _U),
+    "ColorMask": (None, _I, _I, _I, _I),
+    "DeleteFramebuffers": (None, _I, _P),
+    "DeleteQueries": (None, _I, _P),
+    "DeleteTextures": (None, _I, _P),
+    "DepthMask": (None, ctypes.c_ubyte),
+    "DrawBuffers": (None, _I, _P),
+    "FramebufferTexture": (None, _U, _U, _U, _I),
+    "GenFramebuffers": (None, _I, _P),
+    "GenQueries": (None, _I, _P),
+    "GenTextures": (None, _I, _P),
+    "GetError": (_U,),
+    "GetIntegerv": (None, _U, _P),
+    "GetQueryObjectui64v": (None, _U, _U, _P),
+    "GetTexImage": (None, _U, _I, _U, _U, _P),
+    "PixelStorei": (None, _U, _I),
+    "QueryCounter": (None, _U, _U),
+    "TexStorage2D": (None, _U, _I, _U, _I, _I),
+    "TexStorage3D": (None, _U, _I, _U, _I, _I, _I),
+    "TexSubImage2D": (None, _U, _I, _I, _I, _I, _I, _U, _U, _P),
+    "Viewport": (None, _I, _I, _I, _I),
+}
+
+TEXTURE_2D, TEXTURE_2D_ARRAY, TEXTURE0 = 0x0DE1, 0x8C1A, 0x84C0
+FRAMEBUFFER, FRAMEBUFFER_COMPLETE = 0x8D40, 0x8CD5
+COLOR, DEPTH = 0x1800, 0x1801
+COLOR_ATTACHMENT0, DEPTH_ATTACHMENT = 0x8CE0, 0x8D00
+LOWER_LEFT, ZERO_TO_ONE = 0x8CA1, 0x935F
+TIMESTAMP, QUERY_RESULT = 0x8E28, 0x8866
+CLIP_DISTANCE0 = 0x3000
+MAX_TEXTURE_SIZE, MAX_ARRAY_LAYERS, MAX_VIEWPORT_DIMS = 0x0D33, 0x88FF, 0x0D3A
+OUT_OF_MEMORY = 0x0505
+
+
+class GL:
+    """The functions of `_SIGNATURES` as attributes, each loaded when first used."""
+
+    def __init__(self, loader: Loader) -> None:
+        self._loader = loader
+        self._type = ctypes.WINFUNCTYPE if sys.platform == "win32" else ctypes.CFUNCTYPE
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        result, *arguments = _SIGNATURES[name]
+        address = self._loader.load(f"gl{name}")
+        if not address:
+            raise DeviceError(f"OpenGL: this driver has no gl{name}; update the driver, or use --device software")
+        function: Callable[..., Any] = self._type(result, *arguments)(address)
+        setattr(self, name, function)
+        return function
+
+    def make(self, function: str) -> int:
+        """One new name from GenTextures, GenFramebuffers or GenQueries."""
+        name = _U()
+        getattr(self, function)(1, ctypes.byref(name))
+        return name.value
+
+    def delete(self, function: str, name: int) -> None:
+        """Give a name back through DeleteTextures, DeleteFramebuffers or DeleteQueries."""
+        getattr(self, function)(1, ctypes.byref(_U(name)))
+
+    def integers(self, what: int, count: int = 1) -> list[int]:
+        """`count` values of glGetIntegerv."""
+        values = (_I * count)()
+        self.GetIntegerv(what, values)
+        return list(values)
+
+    def check(self, doing: str) -> None:
+        """Raise DeviceError if OpenGL has an error pending: allocations fail silently otherwise."""
+        error = self.GetError()
+        if error:
+            kind = "out of memory" if error == OUT_OF_MEMORY else f"OpenGL error 0x{error:04x}"
+            raise DeviceError(f"{doing}: {kind}; use a smaller size or fewer VPLs")

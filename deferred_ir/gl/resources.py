@@ -1,0 +1,169 @@
+"""Textures, framebuffers and buffers. Textures are raw OpenGL: moderngl has no 32-bit depth and no depth arrays."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..graph import Buffer, Texture
+from . import raw
+from .gpu import Gpu
+
+
+@dataclass(frozen=True)
+class Format:
+    """A texture format: OpenGL's enumerants, and how it reads back."""
+
+    internal: int
+    layout: int
+    type: int
+    channels: int
+    dtype: str
+    bytes: int
+
+    @property
+    def depth(self) -> bool:
+        """Whether it is a depth format."""
+        return self.layout == 0x1902
+
+
+FORMATS = {
+    "rgba32f": Format(0x8814, 0x1908, 0x1406, 4, "f4", 16),
+    "rgba16f": Format(0x881A, 0x1908, 0x1406, 4, "f4", 8),
+    "rgba16": Format(0x805B, 0x1908, 0x1406, 4, "f4", 8),
+    "rgba8": Format(0x8058, 0x1908, 0x1401, 4, "u1", 4),
+    "srgb8": Format(0x8C43, 0x1908, 0x1401, 4, "u1", 4),
+    "r32f": Format(0x822E, 0x1903, 0x1406, 1, "f4", 4),
+    "r32ui": Format(0x8236, 0x8D94, 0x1405, 1, "u4", 4),
+    "depth32f": Format(0x8CAC, 0x1902, 0x1406, 1, "f4", 4),
+}
+"""Formats by the names that ports use; `rgba16` and `rgba8` are normalised integers."""
+
+
+class GpuTexture:
+    """An immutable 2D texture or array of one level. `size` is (width, height)."""
+
+    def __init__(self, gpu: Gpu, description: Texture, size: tuple[int, int]) -> None:
+        self.gpu, self.description, self.size = gpu, description, size
+        self.format = FORMATS[description.format]
+        self.nbytes = size[0] * size[1] * max(description.layers, 1) * self.format.bytes
+        self.target = raw.TEXTURE_2D_ARRAY if description.layers else raw.TEXTURE_2D
+        gl = gpu.gl
+        self.glo = gl.make("GenTextures")
+        gl.BindTexture(self.target, self.glo)
+        if description.layers:
+            gl.TexStorage3D(self.target, 1, self.format.internal, *size, description.layers)
+        else:
+            gl.TexStorage2D(self.target, 1, self.format.internal, *size)
+        gl.check(f"texture {description} of {self.nbytes / 2**20:.0f} MiB")
+
+    def upload(self, pixels: Any) -> None:
+        """Fill a 2D texture from (H, W, channels) rows, bottom row first, in the format's dtype."""
+        gl, data = self.gpu.gl, np.ascontiguousarray(pixels, self.format.dtype)
+        gl.BindTexture(self.target, self.glo)
+        gl.PixelStorei(0x0CF5, 1)  # UNPACK_ALIGNMENT
+        gl.TexSubImage2D(
+            self.target, 0, 0, 0, *self.size, self.format.layout, self.format.type, data.ctypes.data_as(ctypes.c_void_p)
+        )
+
+    def bind(self, unit: int, sampler: Any) -> None:
+        """Make it readable through texture `unit` with a moderngl sampler."""
+        self.gpu.gl.ActiveTexture(raw.TEXTURE0 + unit)
+        self.gpu.gl.BindTexture(self.target, self.glo)
+        sampler.use(unit)
+
+    def read(self) -> np.ndarray:
+        """All texels, (H, W, channels) or (layers, H, W, channels), bottom row first."""
+        layers = (self.description.layers,) if self.description.layers else ()
+        pixels = np.empty((*layers, self.size[1], self.size[0], self.format.channels), self.format.dtype)
+        gl = self.gpu.gl
+        gl.BindTexture(self.target, self.glo)
+        gl.PixelStorei(0x0D05, 1)  # PACK_ALIGNMENT
+        gl.GetTexImage(self.target, 0, self.format.layout, self.format.type, pixels.ctypes.data_as(ctypes.c_void_p))
+        gl.check(f"reading {self.description}")
+        return pixels
+
+    @cached_property
+    def framebuffer(self) -> Framebuffer:
+        """A framebuffer of this texture alone."""
+        return Framebuffer(self.gpu, {"texture": self}, str(self.description))
+
+    def release(self) -> None:
+        """Give the texture back, and its own framebuffer."""
+        if "framebuffer" in self.__dict__:
+            self.framebuffer.release()
+        self.gpu.gl.delete("DeleteTextures", self.glo)
+
+
+class Framebuffer:
+    """The textures a pass draws into: colours in the order given, at most one depth. Arrays are attached whole."""
+
+    def __init__(self, gpu: Gpu, textures: Mapping[str, GpuTexture], name: str) -> None:
+        self.gpu, gl = gpu, gpu.gl
+        self.size = next(iter(textures.values())).size
+        self.glo = gl.make("GenFramebuffers")
+        self.colors = [texture for texture in textures.values() if not texture.format.depth]
+        gl.BindFramebuffer(raw.FRAMEBUFFER, self.glo)
+        for i, color in enumerate(self.colors):
+            gl.FramebufferTexture(raw.FRAMEBUFFER, raw.COLOR_ATTACHMENT0 + i, color.glo, 0)
+        for texture in textures.values():
+            if texture.format.depth:
+                gl.FramebufferTexture(raw.FRAMEBUFFER, raw.DEPTH_ATTACHMENT, texture.glo, 0)
+        targets = [raw.COLOR_ATTACHMENT0 + i for i in range(len(self.colors))]
+        gl.DrawBuffers(len(targets), (ctypes.c_uint * len(targets))(*targets))
+        status = gl.CheckFramebufferStatus(raw.FRAMEBUFFER)
+        if status != raw.FRAMEBUFFER_COMPLETE:
+            gl.check(f"framebuffer of {name}")
+            raise ValueError(f"{name}: framebuffer incomplete (0x{status:04x}): outputs differ in size or layers")
+
+    def bind(self) -> None:
+        """Draw into it from now on, over its whole size."""
+        self.gpu.gl.BindFramebuffer(raw.FRAMEBUFFER, self.glo)
+        self.gpu.gl.Viewport(0, 0, *self.size)
+
+    def clear_color(self, index: int = 0, value: tuple[float, float, float, float] = (0, 0, 0, 0)) -> None:
+        """Fill colour target `index`."""
+        if self.colors[index].format.dtype == "u4":
+            self.gpu.gl.ClearBufferuiv(raw.COLOR, index, (ctypes.c_uint * 4)(*(int(v) for v in value)))
+        else:
+            self.gpu.gl.ClearBufferfv(raw.COLOR, index, (ctypes.c_float * 4)(*value))
+
+    def clear_depth(self, value: float = 0.0) -> None:
+        """Fill the depth target; 0 is infinitely far in reversed depth."""
+        self.gpu.gl.ClearBufferfv(raw.DEPTH, 0, (ctypes.c_float * 1)(value))
+
+    def release(self) -> None:
+        """Give the framebuffer back; its textures stay."""
+        self.gpu.gl.delete("DeleteFramebuffers", self.glo)
+
+
+class GpuBuffer:
+    """A buffer of records that a pass writes from the CPU; `records` is what it wrote last."""
+
+    def __init__(self, gpu: Gpu, description: Buffer) -> None:
+        self.gpu, self.description = gpu, description
+        self.nbytes = -(-description.records // description.block) * description.block * description.stride
+        self.buffer = gpu.ctx.buffer(reserve=self.nbytes, dynamic=True)
+        gpu.gl.check(f"buffer of {description}")
+        self.records: np.ndarray = np.zeros(0)
+
+    def write(self, records: np.ndarray) -> None:
+        """Replace the first len(records) records."""
+        if len(records) > self.description.records or records.itemsize != self.description.stride:
+            raise ValueError(f"{len(records)} records of {records.itemsize} bytes into a buffer of {self.description}")
+        self.records = records
+        self.buffer.write(records.tobytes())
+
+    def bind_uniform(self, binding: int, block: int) -> None:
+        """Make block number `block` of the records visible as a uniform block."""
+        nbytes = self.description.block * self.description.stride
+        self.buffer.bind_to_uniform_block(binding, offset=block * nbytes, size=nbytes)
+
+    def release(self) -> None:
+        """Give the buffer back."""
+        self.buffer.release()

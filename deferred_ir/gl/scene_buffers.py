@@ -1,0 +1,106 @@
+"""A scene on the GPU: vertices, faces, materials and textures, uploaded once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import DeviceError
+from ..graph import Texture
+from ..scene import Scene
+from .gpu import Gpu
+from .resources import GpuTexture
+from .shaders import Program
+
+FACES, MATERIALS = 0, 1
+"""Bindings of the storage buffers that lib/surface.glsl declares."""
+ALBEDO_TEXTURE = 15
+"""Texture unit of `albedo_texture`; inputs of passes count up from 0, and GL promises 16 units."""
+
+
+class SceneBuffers:
+    """Indexed triangles with what shaders read of each face. `defines` say which attributes there are."""
+
+    def __init__(self, gpu: Gpu, scene: Scene) -> None:
+        self.gpu, g = gpu, scene.geometry
+        self.defines = {
+            "HAS_NORMALS": int(g.normals is not None),
+            "HAS_UVS": int(bool(scene.textures) and g.uvs is not None),
+            "HAS_COLORS": int(g.colors is not None),
+        }
+        arrays = {"position": g.positions, "normal": g.normals, "color": g.colors}
+        if self.defines["HAS_UVS"]:
+            arrays["uv"] = g.uvs
+        ctx = gpu.ctx
+        self._attributes = {
+            name: (ctx.buffer(np.ascontiguousarray(array, "f4").tobytes()), f"{array.shape[1]}f")
+            for name, array in arrays.items()
+            if array is not None
+        }
+        self._indices = ctx.buffer(np.ascontiguousarray(g.faces, "u4").tobytes())
+        faces = np.column_stack([g.face_normals, g.face_materials]).astype("f4")
+        materials = np.array([(*material.albedo, 0) for material in scene.materials], "f4")
+        self._faces, self._materials = ctx.buffer(faces.tobytes()), ctx.buffer(materials.tobytes())
+        gpu.gl.check(f"scene '{scene.name}' with {len(g.faces)} triangles")
+        self._textures = [self._upload(texture) for texture in scene.textures]
+        self._ranges = _ranges(scene)
+        self.face_count = len(g.faces)
+        buffers = [*(buffer for buffer, _ in self._attributes.values()), self._indices, self._faces, self._materials]
+        self._buffers = buffers
+        self.buffer_bytes = sum(buffer.size for buffer in buffers)
+        self.texture_bytes = sum(texture.nbytes for texture in self._textures)
+
+    def _upload(self, texture: Any) -> GpuTexture:
+        height, width = texture.pixels.shape[:2]
+        if max(width, height) > self.gpu.max_size:
+            raise DeviceError(
+                f"{texture.name}: {width}x{height} pixels, and this driver takes at most {self.gpu.max_size}; "
+                "scale the image down"
+            )
+        result = GpuTexture(self.gpu, Texture("srgb8", (width, height)), (width, height))
+        alpha = np.full((height, width, 1), 255, np.uint8)
+        result.upload(np.concatenate([texture.pixels, alpha], axis=2)[::-1])
+        return result
+
+    def bind(self) -> None:
+        """Make faces and materials visible to shaders."""
+        self._faces.bind_to_storage_buffer(FACES)
+        self._materials.bind_to_storage_buffer(MATERIALS)
+
+    def draw(self, program: Program, instances: int = 1) -> None:
+        """Draw all triangles: in one call, or one a texture where the program samples textures."""
+        array = program.arrays.get(self)
+        if array is None:
+            attributes = [(*self._attributes[name], name) for name in program.attributes]
+            array = self.gpu.ctx.vertex_array(program.glsl, attributes, self._indices, index_element_size=4)
+            program.arrays[self] = array
+        if "albedo_texture" not in program.samplers:
+            if program.has("first_face"):
+                program.set(first_face=0)
+            array.render(self.gpu.ctx.TRIANGLES, instances=instances)
+            return
+        for texture, first, count in self._ranges:
+            if texture is not None:
+                self._textures[texture].bind(ALBEDO_TEXTURE, self.gpu.sampler(linear=True, repeat=True))
+            program.set(textured=texture is not None, first_face=first)
+            array.render(self.gpu.ctx.TRIANGLES, vertices=3 * count, first=3 * first, instances=instances)
+
+    def release(self) -> None:
+        """Give everything back. Vertex arrays that programs keep for this scene must go first."""
+        for buffer in self._buffers:
+            buffer.release()
+        for texture in self._textures:
+            texture.release()
+
+
+def _ranges(scene: Scene) -> list[tuple[int | None, int, int]]:
+    """(texture, first face, count) of each run of faces with one texture; loading sorts faces by texture."""
+    textures = np.array([-1 if m.texture is None else m.texture for m in scene.materials])
+    of_face = textures[scene.geometry.face_materials]
+    starts = np.flatnonzero(np.diff(of_face, prepend=of_face[0] - 1))
+    ends = np.append(starts[1:], len(of_face))
+    return [
+        (None if of_face[start] < 0 else int(of_face[start]), int(start), int(end - start))
+        for start, end in zip(starts, ends, strict=True)
+    ]

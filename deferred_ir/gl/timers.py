@@ -1,0 +1,71 @@
+"""Time of each pass on GPU and CPU. Timestamps are 64 bits, follow one another without nesting, and are read late."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections import deque
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from . import raw
+from .gpu import Gpu
+
+DELAY = 3
+"""Frames after which timestamps are read without `wait`: by then no driver has to be waited for."""
+
+
+@dataclass
+class _Marks:
+    labels: list[str] = field(default_factory=list)
+    queries: list[int] = field(default_factory=list)
+    cpu: list[float] = field(default_factory=list)
+
+
+class Timers:
+    """Laps of a frame: each `mark` ends the lap before it and starts one, `end` ends the last."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self.gpu = gpu
+        self._free: list[int] = []
+        self._frames: deque[_Marks] = deque()
+
+    def begin(self) -> None:
+        """Start a frame."""
+        self._frames.append(_Marks())
+
+    def mark(self, label: str) -> None:
+        """Start the lap `label`; call it once the pass's framebuffer is bound: that ends the work of the one before."""
+        marks = self._frames[-1]
+        query = self._free.pop() if self._free else self.gpu.gl.make("GenQueries")
+        self.gpu.gl.QueryCounter(query, raw.TIMESTAMP)
+        marks.labels.append(label)
+        marks.queries.append(query)
+        marks.cpu.append(time.perf_counter())
+
+    def end(self) -> None:
+        """End the frame's last lap."""
+        self.mark("end")
+
+    def collect(self, wait: bool = False) -> list[dict[str, tuple[float, float]]]:
+        """Finished frames, oldest first: label -> (GPU ms, CPU ms). `wait` also takes those still in flight."""
+        done = []
+        while self._frames and (wait or len(self._frames) > DELAY):
+            marks = self._frames.popleft()
+            stamps = [self._read(query) for query in marks.queries]
+            self._free.extend(marks.queries)
+            laps = zip(marks.labels[:-1], pairwise(stamps), pairwise(marks.cpu), strict=True)
+            done.append({label: ((g1 - g0) / 1e6, (c1 - c0) * 1e3) for label, (g0, g1), (c0, c1) in laps})
+        return done
+
+    def _read(self, query: int) -> int:
+        value = ctypes.c_uint64()
+        self.gpu.gl.GetQueryObjectui64v(query, raw.QUERY_RESULT, ctypes.byref(value))
+        return value.value
+
+    def release(self) -> None:
+        """Give all queries back."""
+        for query in self._free + [query for marks in self._frames for query in marks.queries]:
+            self.gpu.gl.delete("DeleteQueries", query)
+        self._free.clear()
+        self._frames.clear()

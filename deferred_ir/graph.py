@@ -1,0 +1,301 @@
+"""The render graph: passes with ports, and `compile`, which turns them into a plan. Pure: no OpenGL, no files.
+
+A pass declares its inputs as data and answers, from its parameters and what its inputs are, what it writes. A graph
+wires ports by name at the reader (`inputs = {depth = "gbuffer.depth"}`), so an output has one writer by construction.
+Names are one thing everywhere: a port is the sampler's name in GLSL and the key in the graph file.
+
+Ideas: pure reflection and all faults at once (Falcor), compilation as a short list of steps (Granite), culling by a
+backward walk and tests without a GPU (Filament), descriptions derived from inputs (kajiya).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+from typing import Any, ClassVar
+
+from .errors import GraphError, did_you_mean
+from .params import NoParams
+
+
+@dataclass(frozen=True)
+class Texture:
+    """A texture: `size` (width, height), None for the frame's; `layers` > 0 makes it an array.
+
+    `copies` > 0 makes that many separate textures, which the pass itself attaches and binds one by one.
+    """
+
+    format: str
+    size: tuple[int, int] | None = None
+    layers: int = 0
+    copies: int = 0
+
+    def __str__(self) -> str:
+        size = "frame" if self.size is None else f"{self.size[0]}x{self.size[1]}"
+        many = f" x {self.layers} layers" if self.layers else f", {self.copies} of them" if self.copies else ""
+        return f"{self.format} {size}{many}"
+
+
+@dataclass(frozen=True)
+class Buffer:
+    """A buffer of up to `records` records of `format`, `stride` bytes each, allocated in blocks of `block` records."""
+
+    format: str
+    records: int
+    stride: int
+    block: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.records} {self.format}"
+
+
+Description = Texture | Buffer
+
+
+@dataclass(frozen=True)
+class Input:
+    """A port that reads. `format` None takes any. Filter and comparison belong to the reader, not to the texture.
+
+    `attach`: a depth texture that the pass tests against, attached to its framebuffer instead of sampled.
+    """
+
+    doc: str
+    format: str | None = None
+    optional: bool = False
+    linear: bool = False
+    compare: str | None = None
+    attach: bool = False
+
+
+@dataclass(frozen=True)
+class Output:
+    """A port that writes. `defines` tell the readers' shaders what they must know of the writer (layout, encoding)."""
+
+    doc: str
+    description: Description
+    defines: Mapping[str, int | float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What compile() may know of scene and settings, to leave passes out."""
+
+    emits: bool = True
+    """The spotlight has power."""
+
+
+class Pass:
+    """Base of all passes: ports and parameters as data, `execute` does the work each frame."""
+
+    Params: ClassVar[type] = NoParams
+    inputs: ClassVar[Mapping[str, Input]] = {}
+    shader_folder: ClassVar[Path | None] = None
+    """Where a user's pass keeps its shaders; searched before the package's own."""
+
+    def __init__(self, params: Any = None) -> None:
+        self.params = self.Params() if params is None else params
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """What it writes, a pure function of its parameters and its inputs' descriptions (None: not connected)."""
+        raise NotImplementedError
+
+    def unneeded(self, facts: Facts) -> str | None:
+        """Why this scene does not need the pass, or None."""
+        del facts
+        return None
+
+    def subpasses(self, inputs: Mapping[str, Description | None]) -> Sequence[Mapping[str, Any]]:
+        """The parts that the pass plans for itself, one dictionary each, for whoever looks at the plan."""
+        del inputs
+        return ()
+
+    def execute(self, frame: Any, io: Any) -> None:
+        """Do the work of one frame: `frame` is an executor.Frame, `io` an executor.Io with the pass's ports."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Node:
+    """A pass under its name in a graph; `inputs` maps its ports to sources `pass.port`."""
+
+    name: str
+    work: Pass
+    inputs: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Nodes by name, and the outputs that a caller can ask for, each a source `pass.port`. `origin`: its file."""
+
+    nodes: Mapping[str, Node]
+    outputs: Mapping[str, str]
+    origin: str = "graph"
+
+
+@dataclass(frozen=True)
+class Step:
+    """A node with everything resolved. `sources`: port -> (pass, port), None where nothing is connected."""
+
+    name: str
+    work: Pass
+    sources: Mapping[str, tuple[str, str] | None]
+    outputs: Mapping[str, Output]
+    descriptions: Mapping[str, Description | None]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What runs, in order; why the rest does not; and when each resource is first written and last read."""
+
+    steps: tuple[Step, ...]
+    outputs: Mapping[str, tuple[str, str]]
+    left_out: Mapping[str, str]
+    lifetimes: Mapping[tuple[str, str], tuple[int, int]]
+
+
+def compile(graph: Graph, outputs: Sequence[str], facts: Facts = Facts()) -> Plan:
+    """The plan that produces `outputs` (names in graph.outputs) for a scene with these facts.
+
+    Raises one GraphError that lists all faults.
+    """
+    faults: list[str] = []
+    roots, edges = _resolve(graph, outputs, faults)
+    _raise(graph, faults)
+    unneeded = _leave_out(graph, edges, facts)
+    for name, (source, _) in roots.items():
+        if source in unneeded:
+            faults.append(f"output '{name}' comes from {source}, which is left out: {unneeded[source]}")
+    reached = _reach(roots, edges, unneeded)
+    order = _order(edges, reached, faults)
+    _raise(graph, faults)
+    steps = _describe(graph, edges, order, faults)
+    _raise(graph, faults)
+    left_out = {name: unneeded.get(name, "no requested output needs it") for name in graph.nodes if name not in reached}
+    return Plan(steps, roots, left_out, _lifetimes(steps, roots))
+
+
+Edges = dict[str, dict[str, tuple[str, str] | None]]
+Roots = dict[str, tuple[str, str]]
+
+
+def _raise(graph: Graph, faults: list[str]) -> None:
+    if faults:
+        raise GraphError(f"{graph.origin}: " + "; ".join(faults))
+
+
+def _resolve(graph: Graph, outputs: Sequence[str], faults: list[str]) -> tuple[Roots, Edges]:
+    """Names to (pass, port) pairs. Whether a source has that port is known once it is described."""
+
+    def source(text: str, where: str) -> tuple[str, str] | None:
+        name, dot, port = text.partition(".")
+        if not dot or not name or not port:
+            faults.append(f"{where}: '{text}' is no source; write \"pass.port\"")
+        elif name not in graph.nodes:
+            faults.append(f"{where}: no pass '{name}'{did_you_mean(name, graph.nodes)}")
+        else:
+            return name, port
+        return None
+
+    edges: Edges = {}
+    for node in graph.nodes.values():
+        edges[node.name] = dict.fromkeys(node.work.inputs)
+        for port, text in node.inputs.items():
+            if port not in node.work.inputs:
+                faults.append(f"{node.name}: no input '{port}'{did_you_mean(port, node.work.inputs)}")
+            else:
+                edges[node.name][port] = source(text, f"{node.name}.{port}")
+        for port, declared in node.work.inputs.items():
+            if not declared.optional and port not in node.inputs:
+                faults.append(f'{node.name}.{port}: not connected; add inputs = {{ {port} = "pass.port" }}')
+    roots: Roots = {}
+    for name in outputs:
+        if name not in graph.outputs:
+            faults.append(f"no output '{name}'{did_you_mean(name, graph.outputs)}")
+        elif found := source(graph.outputs[name], f"outputs.{name}"):
+            roots[name] = found
+    return roots, edges
+
+
+def _leave_out(graph: Graph, edges: Edges, facts: Facts) -> dict[str, str]:
+    """Passes that this scene does not need, and those that cannot run without them."""
+    unneeded = {node.name: why for node in graph.nodes.values() if (why := node.work.unneeded(facts))}
+    changed = True
+    while changed:
+        changed = False
+        for node in graph.nodes.values():
+            for port, source in edges[node.name].items():
+                gone = source is not None and source[0] in unneeded and not node.work.inputs[port].optional
+                if gone and source and node.name not in unneeded:
+                    unneeded[node.name] = f"its input {port} comes from {source[0]}, which is left out"
+                    changed = True
+    for ports in edges.values():
+        for port, source in ports.items():
+            if source is not None and source[0] in unneeded:
+                ports[port] = None
+    return unneeded
+
+
+def _reach(roots: Roots, edges: Edges, unneeded: Mapping[str, str]) -> set[str]:
+    """The backward walk: every pass that a requested output needs."""
+    reached: set[str] = set()
+    stack = [name for name, _ in roots.values()]
+    while stack:
+        name = stack.pop()
+        if name not in reached and name not in unneeded:
+            reached.add(name)
+            stack.extend(source[0] for source in edges[name].values() if source)
+    return reached
+
+
+def _order(edges: Edges, reached: set[str], faults: list[str]) -> list[str]:
+    """Writers before readers; the same file always gives the same order."""
+    sorter: TopologicalSorter[str] = TopologicalSorter()
+    for name, ports in edges.items():
+        if name in reached:
+            sorter.add(name, *(source[0] for source in ports.values() if source))
+    try:
+        return list(sorter.static_order())
+    except CycleError as error:
+        faults.append("cycle: " + " -> ".join(error.args[1]) + "; remove one of these inputs")
+        return []
+
+
+def _describe(graph: Graph, edges: Edges, order: list[str], faults: list[str]) -> tuple[Step, ...]:
+    """Ask each pass what it writes, given what it reads, and hold both ends of each wire together."""
+    steps: dict[str, Step] = {}
+    for name in order:
+        work, descriptions = graph.nodes[name].work, dict[str, Description | None]()
+        wires = {port: source for port, source in edges[name].items() if source}
+        if any(source not in steps for source, _ in wires.values()):
+            continue  # its writer is at fault; what it would read is unknown
+        found_faults = len(faults)
+        for port, (source, written) in wires.items():
+            outputs = steps[source].outputs
+            if written not in outputs:
+                faults.append(f"{name}.{port}: {source} has no output '{written}'{did_you_mean(written, outputs)}")
+                continue
+            descriptions[port] = found = outputs[written].description
+            wanted = work.inputs[port].format
+            if wanted not in (None, found.format):
+                faults.append(f"{name}.{port} wants {wanted}, but {source}.{written} is {found.format}")
+        if len(faults) == found_faults:
+            described = dict.fromkeys(work.inputs) | descriptions
+            steps[name] = Step(name, work, edges[name], work.outputs(described), described)
+    for name, text in graph.outputs.items():
+        source_name, _, port = text.partition(".")
+        if source_name in steps and port not in steps[source_name].outputs:
+            hint = did_you_mean(port, steps[source_name].outputs)
+            faults.append(f"outputs.{name}: {source_name} has no output '{port}'{hint}")
+    return tuple(steps.values())
+
+
+def _lifetimes(steps: tuple[Step, ...], roots: Roots) -> dict[tuple[str, str], tuple[int, int]]:
+    """First writer and last reader of each resource, as indices of steps; requested outputs live to the end."""
+    spans = {(step.name, port): (i, i) for i, step in enumerate(steps) for port in step.outputs}
+    for i, step in enumerate(steps):
+        for source in step.sources.values():
+            if source:
+                spans[source] = (spans[source][0], i)
+    return spans | {root: (spans[root][0], len(steps) - 1) for root in roots.values()}

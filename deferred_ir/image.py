@@ -1,0 +1,83 @@
+"""A rendered image and the files it becomes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .errors import OutputError, did_you_mean
+from .typing import Array
+
+SUFFIXES = (".png", ".npy", ".exr")
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """radiance: float32 (H, W, 3), linear RGB, top row first, or None where it was not asked for.
+
+    display: uint8 (H, W, 3), sRGB, tone-mapped by the graph, or None likewise.
+    """
+
+    radiance: Array
+    display: Any
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write `.png` (display pixels), `.npy` or `.exr` (float32 radiance); the file appears whole or not at all."""
+        path = Path(path)
+        check_path(path)
+        write = {".png": self._png, ".npy": self._npy, ".exr": self._exr}[path.suffix.lower()]
+        write_whole(path, write)
+
+    def _png(self, path: Path) -> None:
+        import PIL.Image
+
+        if self.display is None:
+            raise OutputError(f"{path.name}: this graph has no output 'display' to write as PNG; save .npy or .exr")
+        PIL.Image.fromarray(self.display).save(path, format="PNG")
+
+    def _npy(self, path: Path) -> None:
+        with path.open("wb") as file:
+            np.save(file, self.radiance)
+
+    def _exr(self, path: Path) -> None:
+        import OpenEXR
+
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        with OpenEXR.File(header, {"RGB": np.ascontiguousarray(self.radiance, np.float32)}) as file:
+            file.write(str(path))
+
+
+def check_path(path: str | os.PathLike[str]) -> None:
+    """Raise OutputError if `path` cannot be a result: better before the work than after it."""
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise OutputError(f"{path}: unknown kind of image '{path.suffix}'{did_you_mean(path.suffix, SUFFIXES)}")
+    check_folder(path)
+
+
+def check_folder(path: Path) -> None:
+    """Raise OutputError if no file can be written at `path`."""
+    folder = path.parent
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder; name a file in it")
+    if not folder.is_dir():
+        raise OutputError(f"{path}: there is no folder '{folder}'; create it first")
+    if not os.access(folder, os.W_OK):
+        raise OutputError(f"{path}: the folder '{folder}' is not writable; choose another")
+
+
+def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+    """Let `write` fill a file beside `path`, then put it in place at once."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        write(part)
+        os.replace(part, path)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
+    finally:
+        part.unlink(missing_ok=True)

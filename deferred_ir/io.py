@@ -1,0 +1,101 @@
+"""What a pass sees while it executes: its ports, its programs, and a base for passes that are one fullscreen shader."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from .errors import ShaderError
+from .frame import Frame
+from .gl.resources import Framebuffer, GpuBuffer, GpuTexture
+from .gl.shaders import Program, ShaderLibrary
+from .graph import Pass, Step
+from .params import specs
+
+Resource = GpuTexture | GpuBuffer | list[GpuTexture]
+SCENE_SAMPLERS = {"albedo_texture"}
+"""Samplers that SceneBuffers binds; all others must be ports."""
+
+
+class Io:
+    """A pass's ports during `execute`: `io["depth"]` is a resource; `io.program(...)` knows the inputs' defines.
+
+    written: the defines of each (pass, port) of the plan. counters: where figures of the frame are published.
+    """
+
+    def __init__(
+        self,
+        library: ShaderLibrary,
+        step: Step,
+        ports: Mapping[str, Resource | None],
+        written: Mapping[tuple[str, str], Mapping[str, int | float]],
+        counters: Counter[str],
+    ) -> None:
+        self._library, self._step, self._ports, self._counters = library, step, ports, counters
+        self.gpu = library.gpu
+        self.framebuffer: Framebuffer | None = None
+        self._programs: dict[Any, Program] = {}
+        textures = [name for name in step.work.inputs if isinstance(ports[name], GpuTexture)]
+        sampled = [name for name in textures if not step.work.inputs[name].attach]
+        self._units = {name: i for i, name in enumerate(sampled)}
+        self._defines: dict[str, int | float] = {f"UNIT_{name.upper()}": i for name, i in self._units.items()}
+        for name, source in step.sources.items():
+            self._defines[f"HAS_{name.upper()}"] = int(source is not None)
+            if source:
+                self._defines |= written[source]
+        for output in step.outputs.values():
+            self._defines |= output.defines
+
+    def __getitem__(self, port: str) -> Any:
+        if port not in self._ports:
+            raise KeyError(f"{self._step.name} declares no port '{port}'; it has: {', '.join(self._ports)}")
+        return self._ports[port]
+
+    def bind(self) -> None:
+        """Bind the framebuffer and all sampled inputs."""
+        if self.framebuffer:
+            self.framebuffer.bind()
+        for name, unit in self._units.items():
+            port = self._step.work.inputs[name]
+            self[name].bind(unit, self.gpu.sampler(port.linear, port.compare))
+
+    def program(
+        self, fragment: str | None, vertex: str = "fullscreen.vert", geometry: str | None = None, **defines: int | float
+    ) -> Program:
+        """The program of these shader files, with the defines of this pass's ports and `defines`."""
+        key = (fragment, vertex, geometry, *defines.items())
+        if key not in self._programs:
+            program = self._library.program(
+                fragment, vertex, geometry, self._defines | defines, self._step.work.shader_folder
+            )
+            unknown = program.samplers - SCENE_SAMPLERS - set(self._step.work.inputs)
+            if unknown:
+                raise ShaderError(f"{program.name}: sampler '{min(unknown)}' is no input of pass {self._step.name}")
+            self._programs[key] = program
+        return self._programs[key]
+
+    def count(self, name: str, value: int) -> None:
+        """Publish a figure of this frame, such as the number of maps drawn."""
+        self._counters[name] += value
+
+
+class FullscreenPass(Pass):
+    """A pass that runs `fragment` once a pixel: inputs are samplers and parameters are uniforms of the same name.
+
+    A pass of this kind is its ports and its parameters.
+    """
+
+    fragment: ClassVar[str]
+    vertex: ClassVar[str] = "fullscreen.vert"
+
+    def uniforms(self) -> Mapping[str, Any]:
+        """Uniform values; parameters by default."""
+        return {name: getattr(self.params, name) for name in specs(self.Params)}
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Draw the fullscreen triangle."""
+        del frame
+        program = io.program(self.fragment, self.vertex)
+        program.set(**self.uniforms())
+        program.draw_fullscreen()

@@ -1,0 +1,41 @@
+"""What all passes that draw planar shadow maps share: their parameters and what readers must know of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from .params import param
+
+
+@dataclass(frozen=True)
+class MapParams:
+    """Parameters of shadow maps."""
+
+    spot_size: int = param(1024, lo=16, hi=16384, doc="Width and height of the spotlight's map, texels.")
+    vpl_size: int = param(256, lo=16, hi=4096, doc="Width and height of a VPL's map, texels.")
+    spot_offset: float = param(
+        1.0, lo=0.0, hi=16.0, doc="How far a point is lifted off its face before the spotlight's map is asked, texels."
+    )
+    vpl_offset: float = param(0.75, lo=0.0, hi=16.0, doc="The same before a VPL's map is asked, texels.")
+    cull: Literal["none", "front"] = param(
+        "none", doc="front: draw back faces only, which moves the bias to the dark side; for closed meshes."
+    )
+
+    def defines(self) -> dict[str, int | float]:
+        """For the shaders of writer and readers."""
+        return {
+            "SPOT_SIZE": self.spot_size,
+            "VPL_SIZE": self.vpl_size,
+            "SPOT_OFFSET": float(self.spot_offset),
+            "VPL_OFFSET": float(self.vpl_offset),
+        }
+
+    def prepare(self, gpu: Any) -> None:
+        """OpenGL state for drawing maps in reversed depth."""
+        ctx = gpu.ctx
+        ctx.enable(ctx.DEPTH_TEST)
+        ctx.depth_func = ">"
+        if self.cull == "front":
+            ctx.enable(ctx.CULL_FACE)
+            ctx.cull_face = "front"

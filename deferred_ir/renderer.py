@@ -1,0 +1,170 @@
+"""The way in: a Renderer holds one OpenGL context, one graph and the last scene it drew."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from . import config
+from .errors import SettingError
+from .executor import Executor
+from .frame import Frame
+from .gl.gpu import Gpu
+from .gl.scene_buffers import SceneBuffers
+from .gl.timers import Timers
+from .graph import Facts, Graph, Pass, Plan, compile
+from .image import Image
+from .scene import Geometry, Scene
+from .timing import Record
+from .tracing import Tracer
+
+
+def facts(scene: Scene) -> Facts:
+    """What compile() may know of a scene."""
+    return Facts(emits=any(scene.spotlight.emission))
+
+
+class Renderer:
+    """Renders scenes through a render graph.
+
+    size: (width, height) in pixels. graph: a built-in name or a graph file. device: see `deferred-ir devices`.
+    set: parameters of passes, {"pass.param": value}. passes: pass classes of your own, {type name: class}, which a
+    graph file then names.
+
+    One context, one scene upload: render as often as you like, and close it (or use `with`). It belongs to the thread
+    that made it.
+    """
+
+    def __init__(
+        self,
+        size: tuple[int, int] = (512, 512),
+        graph: str | Path = "deferred",
+        device: str = "auto",
+        *,
+        set: Mapping[str, Any] | None = None,
+        passes: Mapping[str, type[Pass]] | None = None,
+    ) -> None:
+        if len(size) != 2 or not all(isinstance(n, int) and n > 0 for n in size):
+            raise SettingError(f"size {size!r}: wants two whole numbers above 0, width and height")
+        self.size = size
+        self._graph_name, self._set, self._passes = graph, dict(set or {}), dict(passes or {})
+        self._graphs: dict[int | None, Graph] = {}
+        self._plans: dict[Any, Plan] = {}
+        self.graph(None)  # a fault in the graph shows before a context is made
+        self.gpu = Gpu(device)
+        if max(size) > self.gpu.max_size:
+            self.gpu.close()
+            raise SettingError(f"size {size[0]}x{size[1]}: this driver draws at most {self.gpu.max_size} a side")
+        self.executor = Executor(self.gpu)
+        self._timers = Timers(self.gpu)
+        self._buffers: SceneBuffers | None = None
+        self._tracer: Tracer | None = None
+        self._geometry: Geometry | None = None
+
+    def graph(self, vpls: int | None) -> Graph:
+        """The graph with this number of VPLs, None for its own."""
+        if vpls not in self._graphs:
+            count = {} if vpls is None else {"vpl.count": vpls}
+            self._graphs[vpls] = config.load_graph(self._graph_name, self._set | count, self._passes)
+        return self._graphs[vpls]
+
+    def plan(self, scene: Scene, vpls: int | None = None, outputs: Sequence[str] | None = None) -> Plan:
+        """What a frame of `scene` runs; `outputs` are all that the graph has unless some are named."""
+        graph, known = self.graph(vpls), facts(scene)
+        wanted = tuple(graph.outputs if outputs is None else outputs)
+        key = (vpls, known, wanted)
+        if key not in self._plans:
+            self._plans[key] = compile(graph, wanted, known)
+        return self._plans[key]
+
+    def render(self, scene: Scene, *, vpls: int | None = None, seed: int = 0, time: float = 0.0) -> Image:
+        """One image of `scene` at `time` seconds with `vpls` VPLs (None: as many as the graph says)."""
+        plan = self.plan(scene, vpls)
+        self.draw(scene, plan, seed=seed, time=time)
+        return self.read(plan)
+
+    def draw(self, scene: Scene, plan: Plan, *, seed: int = 0, time: float = 0.0, record: Record | None = None) -> None:
+        """Draw one whole frame and wait for it; what it took is added to `record`."""
+        with self.gpu.ctx:
+            self._upload(scene)
+            assert self._buffers
+            start = clock.perf_counter()
+            frame = Frame(self.size, scene.at(time), self._buffers, self._trace, seed, time)
+            timers = self._timers if record else None
+            if timers:
+                timers.begin()
+            self.executor.run(plan, frame, timers)
+            if timers:
+                timers.end()
+            self.gpu.ctx.finish()
+            if record and timers:
+                record.frame_ms.append((clock.perf_counter() - start) * 1e3)
+                record.laps += timers.collect()
+                record.counters.append(dict(self.executor.counters))
+
+    def finish(self, record: Record) -> None:
+        """Add the timestamps still in flight to `record`."""
+        record.laps += self._timers.collect(wait=True)
+
+    def read(self, plan: Plan) -> Image:
+        """The image that the last `draw` of `plan` made."""
+        with self.gpu.ctx:
+            arrays = {name: self.executor.resource(source).read()[::-1] for name, source in plan.outputs.items()}
+        radiance, display = arrays.get("radiance"), arrays.get("display")
+        return Image(
+            None if radiance is None else np.ascontiguousarray(radiance[..., :3]),
+            None if display is None else np.ascontiguousarray(display[..., :3]),
+        )
+
+    def memory(self) -> dict[str, int]:
+        """Bytes of textures and buffers on the device, the scene's included."""
+        memory = self.executor.memory()
+        if self._buffers:
+            memory["textures"] += self._buffers.texture_bytes
+            memory["buffers"] += self._buffers.buffer_bytes
+        return memory
+
+    @property
+    def embree_seconds(self) -> float:
+        """Time spent inside Embree since the scene was loaded."""
+        return self._tracer.seconds if self._tracer else 0.0
+
+    def _upload(self, scene: Scene) -> None:
+        """Put the scene's geometry on the device unless it is there; the same geometry may have a new camera or light."""
+        if scene.geometry is self._geometry:
+            return
+        self._forget()
+        self._buffers = SceneBuffers(self.gpu, scene)
+        self._geometry, self._scene = scene.geometry, scene
+
+    def _trace(self) -> Tracer:
+        if self._tracer is None:
+            self._tracer = Tracer(self._scene)
+        return self._tracer
+
+    def _forget(self) -> None:
+        if self._buffers:
+            self.executor.library.forget(self._buffers)
+            self._buffers.release()
+        self._buffers = self._tracer = self._geometry = None
+
+    def close(self) -> None:
+        """Give the context and all in it back."""
+        with self.gpu.ctx:
+            self._forget()
+            self._timers.release()
+            self.executor.release()
+        self.gpu.close()
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

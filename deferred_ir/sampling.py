@@ -1,0 +1,65 @@
+"""Sample patterns in the unit square, and the map from there to a disc.
+
+Sources: Shirley and Chiu 1997 (concentric map); Owen 1998, Joe and Kuo 2008 through scipy.stats.qmc (scrambled Sobol
+and Halton).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Literal, get_args
+
+import numpy as np
+
+from .typing import Array
+
+Pattern = Literal["random", "stratified", "halton", "sobol"]
+PATTERNS: tuple[str, ...] = get_args(Pattern)
+
+
+@lru_cache(maxsize=64)
+def unit_square(pattern: Pattern, count: int, seed: int) -> Array:
+    """`count` points in [0, 1)^2, float64 (count, 2), the same for the same arguments. Read-only: it is cached."""
+    points = _points(pattern, count, seed)
+    points.flags.writeable = False
+    return points
+
+
+def _points(pattern: Pattern, count: int, seed: int) -> Array:
+    rng = np.random.default_rng(seed)
+    if count == 0 or pattern == "random":
+        return rng.random((count, 2))
+    if pattern == "stratified":
+        return _stratified(count, rng)
+    from scipy.stats import qmc
+
+    if pattern == "halton":
+        return np.asarray(qmc.Halton(2, rng=rng).random(count))
+    # A Sobol set of 2^m points is balanced; of another count, its first points are taken. Asking for all 2^m keeps
+    # SciPy from warning about what `count` says already.
+    return np.asarray(qmc.Sobol(2, rng=rng).random_base2(int(np.ceil(np.log2(count)))))[:count]
+
+
+def _stratified(count: int, rng: np.random.Generator) -> Array:
+    """Jittered cells: rows of nearly equal area and count, so that any `count` works, not only squares."""
+    rows = max(1, round(np.sqrt(count)))
+    per_row = np.diff(np.arange(rows + 1) * count // rows)
+    row = np.repeat(np.arange(rows), per_row)
+    column = np.arange(count) - np.repeat(np.cumsum(per_row) - per_row, per_row)
+    # A row is as high as its share of the points, so all cells have the same area.
+    heights = per_row / count
+    tops = np.cumsum(heights) - heights
+    u = (column + rng.random(count)) / per_row[row]
+    v = tops[row] + heights[row] * rng.random(count)
+    return np.minimum(np.stack([u, v], axis=1), np.nextafter(1, 0))
+
+
+def disc(square: Array) -> Array:
+    """Points of the unit square (n, 2) to the unit disc, preserving area and strata (Shirley and Chiu 1997)."""
+    a, b = 2 * square[:, 0] - 1, 2 * square[:, 1] - 1
+    wide = np.abs(a) > np.abs(b)
+    radius = np.where(wide, a, b)
+    # The smaller over the larger coordinate; both are 0 only at the centre, where the angle does not matter.
+    ratio = np.where(wide, b, a) / np.where(radius == 0, 1, radius)
+    angle = np.where(wide, np.pi / 4 * ratio, np.pi / 2 - np.pi / 4 * ratio)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)

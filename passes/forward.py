@@ -1,0 +1,72 @@
+"""The assignment's way, kept as the baseline: the scene is drawn for each light and added up by blending.
+
+lights, depth and primitives of the prepass, a plain depth map for each light -> radiance. Positions are interpolated from
+the vertices; nothing comes from a G-buffer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from deferred_ir.frame import Frame
+from deferred_ir.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.io import Io
+from deferred_ir.lights import LIGHTS_PER_BLOCK
+from deferred_ir.params import param
+
+FIRST_MAP = 1
+"""Texture unit of the first depth map; unit 0 holds the primitives."""
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of the baseline."""
+
+    lights_per_draw: int = param(1, lo=1, hi=8, doc="VPLs that one draw of the scene adds up.")
+
+
+class Forward(Pass):
+    """Reflected radiance, one draw of the scene for the spotlight and one for every `lights_per_draw` VPLs."""
+
+    Params = Params
+    inputs: ClassVar[Mapping[str, Input]] = {
+        "lights": Input("the spotlight, then the VPLs", format="light"),
+        "primitives": Input("face that shows, plus one", format="r32ui"),
+        "depth": Input("depth of that face", format="depth32f", attach=True),
+        "spot": Input("the spotlight's map", format="depth32f"),
+        "vpls": Input("the VPLs' maps", format="depth32f"),
+    }
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Radiance in 32 bits: 256 terms drown in a half float."""
+        del inputs
+        return {"radiance": Output("reflected radiance, linear RGB; 0 on the background", Texture("rgba32f"))}
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Draw the scene for each group of lights."""
+        ctx, lights, group = io.gpu.ctx, io["lights"], self.params.lights_per_draw
+        io.framebuffer.clear_color()
+        ctx.enable(ctx.DEPTH_TEST | ctx.BLEND)
+        ctx.depth_func, ctx.blend_func = "==", (ctx.ONE, ctx.ONE)
+        io.gpu.gl.DepthMask(0)
+        defines = {"UNIT_MAPS": FIRST_MAP, "LIGHTS_PER_DRAW": group, **frame.buffers.defines}
+        compare = io.gpu.sampler(linear=True, compare=">=")
+        lights.bind_uniform(1, 0)
+        io["spot"][0].bind(FIRST_MAP, compare)
+        frame.buffers.draw(io.program("forward.frag", "scene.vert", SPOT=1, **defines))
+        program = io.program("forward.frag", "scene.vert", SPOT=0, **defines)
+        number = 1  # of the light; a group must not straddle two blocks
+        while number < len(lights.records):
+            block, first = divmod(number, LIGHTS_PER_BLOCK)
+            count = min(group, len(lights.records) - number, LIGHTS_PER_BLOCK - first)
+            for i in range(count):
+                io["vpls"][number - 1 + i].bind(FIRST_MAP + i, compare)
+            lights.bind_uniform(1, block)
+            program.set(first=first, count=count)
+            frame.buffers.draw(program)
+            number += count
+
+
+PASS = Forward

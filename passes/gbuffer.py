@@ -1,0 +1,38 @@
+"""Draw the scene once and keep what lighting needs: -> normals, albedo, depth (20 bytes a pixel).
+
+Positions come back from the depth: reversed, in 32 bits, it loses nothing that shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from deferred_ir.frame import Frame
+from deferred_ir.graph import Description, Output, Pass, Texture
+from deferred_ir.io import Io
+
+
+class GBuffer(Pass):
+    """Depth, normals and reflectance of the nearest surface in each pixel."""
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Three targets of the frame's size."""
+        del inputs
+        return {
+            "normals": Output("shading and geometric normal, octahedral, towards the viewer", Texture("rgba16")),
+            "albedo": Output("reflectance, linear RGB; alpha 1 on surfaces", Texture("rgba16f")),
+            "depth": Output("reversed depth, near/z; 0 is the background", Texture("depth32f")),
+        }
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Draw all triangles."""
+        io.framebuffer.clear_color(0)
+        io.framebuffer.clear_color(1)
+        io.framebuffer.clear_depth()
+        ctx = io.gpu.ctx
+        ctx.enable(ctx.DEPTH_TEST)
+        ctx.depth_func = ">"
+        frame.buffers.draw(io.program("gbuffer.frag", "scene.vert", **frame.buffers.defines))
+
+
+PASS = GBuffer

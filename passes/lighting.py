@@ -1,0 +1,46 @@
+"""Add up the spotlight and all VPLs in one fullscreen pass: lights, G-buffer, shadows -> radiance.
+
+One shader for all lights: it reads them from a uniform block and their shadows from one texture array. More lights than
+a block holds are drawn block by block and added in 32-bit floats.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from deferred_ir.frame import Frame
+from deferred_ir.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.io import Io
+from deferred_ir.lights import LIGHTS_PER_BLOCK
+
+
+class Lighting(Pass):
+    """Reflected radiance rho/pi * sum of I(w) cos V / d^2, linear RGB."""
+
+    inputs: Mapping[str, Input] = {
+        "lights": Input("the spotlight, then the VPLs", format="light"),
+        "depth": Input("reversed depth", format="depth32f"),
+        "normals": Input("shading and geometric normal", format="rgba16"),
+        "albedo": Input("reflectance", format="rgba16f"),
+        "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
+    }
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Radiance in 32 bits: 256 terms drown in a half float."""
+        del inputs
+        return {"radiance": Output("reflected radiance, linear RGB; 0 on the background", Texture("rgba32f"))}
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """One fullscreen draw a block of lights."""
+        del frame
+        ctx, lights = io.gpu.ctx, io["lights"]
+        program = io.program("lighting.frag")
+        ctx.blend_func = ctx.ONE, ctx.ONE
+        for start in range(0, len(lights.records), LIGHTS_PER_BLOCK):
+            lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
+            program.set(first=int(start == 0), count=min(LIGHTS_PER_BLOCK, len(lights.records) - start))
+            program.draw_fullscreen()
+            ctx.enable(ctx.BLEND)
+
+
+PASS = Lighting

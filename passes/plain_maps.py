@@ -1,0 +1,55 @@
+"""Shadow maps the plain way, for the baseline: lights -> spot, vpls, one depth texture for each light.
+
+Drawn light by light with nothing of the atlas, so that a fault in its tiles cannot hide from the comparison.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from deferred_ir.frame import Frame
+from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
+from deferred_ir.io import Io
+from deferred_ir.lights import LIGHTS_PER_BLOCK
+from deferred_ir.maps import MapParams
+
+
+class PlainMaps(Pass):
+    """A depth map for each light."""
+
+    Params = MapParams
+    inputs: ClassVar[Mapping[str, Input]] = {"lights": Input("the lights to draw maps for", format="light")}
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """A texture for each light that the buffer can hold."""
+        lights, p = inputs["lights"], self.params
+        count = lights.records if isinstance(lights, Buffer) else 1
+        spot = Texture("depth32f", size=(p.spot_size, p.spot_size), copies=1)
+        vpls = Texture("depth32f", size=(p.vpl_size, p.vpl_size), copies=max(count - 1, 1))
+        return {
+            "spot": Output("reversed depth from the spotlight", spot, p.defines()),
+            "vpls": Output("reversed depth from each VPL", vpls, p.defines()),
+        }
+
+    def unneeded(self, facts: Facts) -> str | None:
+        """A dark spotlight makes no VPLs either."""
+        return None if facts.emits else "no light needs one: the spotlight emits nothing"
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Draw the scene for each light."""
+        self.params.prepare(io.gpu)
+        program = io.program("depth.frag", "plain_maps.vert")
+        total = len(io["lights"].records)
+        for i, texture in enumerate([*io["spot"], *io["vpls"]][:total]):
+            if i % LIGHTS_PER_BLOCK == 0:
+                io["lights"].bind_uniform(1, i // LIGHTS_PER_BLOCK)
+            framebuffer = texture.framebuffer
+            framebuffer.bind()
+            framebuffer.clear_depth()
+            program.set(light_number=i % LIGHTS_PER_BLOCK)
+            frame.buffers.draw(program)
+        io.count("maps_drawn", total)
+
+
+PASS = PlainMaps

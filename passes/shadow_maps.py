@@ -1,0 +1,98 @@
+"""Shadow maps of all lights in one depth texture array: lights -> atlas.
+
+One pass over all lights, for they are too many and too volatile for a node each. The spotlight owns layer 0, each VPL a
+tile on the layers behind it. The pass plans a sub-pass for each light and draws the dirty ones in one instanced call a
+block of lights: the vertex shader chooses layer and tile, four clip distances cut the tile out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from deferred_ir.errors import GraphError
+from deferred_ir.frame import Frame
+from deferred_ir.gl import raw
+from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
+from deferred_ir.io import Io
+from deferred_ir.lights import LIGHTS_PER_BLOCK
+from deferred_ir.maps import MapParams
+from deferred_ir.params import param
+
+
+@dataclass(frozen=True)
+class Params(MapParams):
+    """Parameters of the atlas."""
+
+    budget: int = param(1280, lo=1, hi=65536, doc="Most memory that the atlas may take, MiB.")
+
+
+class ShadowMaps(Pass):
+    """Depth as each light sees it."""
+
+    Params = Params
+    inputs: Mapping[str, Input] = {"lights": Input("the lights to draw maps for", format="light")}
+
+    def _tiles_per_layer(self) -> int:
+        return int(self._edge() // self.params.vpl_size) ** 2
+
+    def _edge(self) -> int:
+        return max(self.params.spot_size, self.params.vpl_size)
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """The atlas, as large as the lights need."""
+        vpls, edge, per_layer = _lights(inputs) - 1, self._edge(), self._tiles_per_layer()
+        layers = 1 + -(-vpls // per_layer)
+        allowed = self.params.budget * 2**20 // (4 * edge * edge)
+        if layers > allowed:
+            fits = max(allowed - 1, 0) * per_layer
+            raise GraphError(
+                f"shadow_maps: maps for {vpls} VPLs of {self.params.vpl_size}x{self.params.vpl_size} need "
+                f"{layers * 4 * edge * edge // 2**20} MiB, and shadow_maps.budget is {self.params.budget}; "
+                f"{fits} VPLs fit; use fewer, a smaller shadow_maps.vpl_size or a larger budget"
+            )
+        defines = {**self.params.defines(), "ATLAS_SIZE": edge}
+        atlas = Texture("depth32f", size=(edge, edge), layers=layers)
+        return {"atlas": Output("reversed depth; layer 0 the spotlight's, then tiles of VPLs", atlas, defines)}
+
+    def unneeded(self, facts: Facts) -> str | None:
+        """A dark spotlight makes no VPLs either."""
+        return None if facts.emits else "no light needs one: the spotlight emits nothing"
+
+    def subpasses(self, inputs: Mapping[str, Description | None]) -> Sequence[Mapping[str, Any]]:
+        """A sub-pass for each light that the buffer can hold."""
+        per_layer, why = self._tiles_per_layer(), "every frame redoes everything"
+        spot = {"light": "spotlight", "layer": 0, "tile": 0, "size": self.params.spot_size}
+        tiles = [
+            {"light": f"vpl {i}", "layer": 1 + i // per_layer, "tile": i % per_layer, "size": self.params.vpl_size}
+            for i in range(_lights(inputs) - 1)
+        ]
+        return [{**tile, "state": "dirty", "why": why} for tile in [spot, *tiles]]
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Clear, then draw the scene once for each light."""
+        gpu, lights = io.gpu, io["lights"]
+        io.framebuffer.clear_depth()
+        self.params.prepare(gpu)
+        for side in range(4):
+            gpu.ctx.enable_direct(raw.CLIP_DISTANCE0 + side)
+        geometry = None if gpu.layer_from_vertex else "shadow_maps.geom"
+        program = io.program("depth.frag", "shadow_maps.vert", geometry)
+        program.set(first=0)
+        total = len(lights.records)
+        for start in range(0, total, LIGHTS_PER_BLOCK):
+            lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
+            frame.buffers.draw(program, instances=min(LIGHTS_PER_BLOCK, total - start))
+        for side in range(4):
+            gpu.ctx.disable_direct(raw.CLIP_DISTANCE0 + side)
+        io.count("maps_drawn", total)
+
+
+def _lights(inputs: Mapping[str, Description | None]) -> int:
+    """How many lights the buffer can hold."""
+    lights = inputs["lights"]
+    return lights.records if isinstance(lights, Buffer) else 1
+
+
+PASS = ShadowMaps

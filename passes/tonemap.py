@@ -1,0 +1,52 @@
+"""Radiance to display pixels: exposure, tone curve, sRGB. The only place that does so.
+
+Curves: Khronos PBR Neutral (specification of 2024), Reinhard et al. 2002, ACES as fitted by Narkowicz 2015.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, get_args
+
+from deferred_ir.graph import Description, Input, Output, Texture
+from deferred_ir.io import FullscreenPass
+from deferred_ir.params import param
+
+Operator = Literal["neutral", "reinhard", "aces", "none"]
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of the display transform."""
+
+    operator: Operator = param("neutral", doc="Tone curve; none clips.")
+    exposure: float | Literal["auto"] = param(
+        "auto", lo=-64.0, hi=64.0, doc="Stops; auto brings the mean luminance of lit surfaces to middle grey."
+    )
+
+
+class Tonemap(FullscreenPass):
+    """Exposure, tone curve, sRGB encoding, 8 bits."""
+
+    Params = Params
+    inputs: ClassVar[Mapping[str, Input]] = {"radiance": Input("linear radiance", format="rgba32f")}
+    fragment = "tonemap.frag"
+    vertex = "tonemap.vert"
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Display pixels."""
+        del inputs
+        return {"color": Output("sRGB-encoded display colour", Texture("rgba8"))}
+
+    def uniforms(self) -> Mapping[str, Any]:
+        """The operator as its number."""
+        auto = self.params.exposure == "auto"
+        return {
+            "operator_number": get_args(Operator).index(self.params.operator),
+            "automatic": auto,
+            "scale": 1.0 if auto else 2.0**self.params.exposure,
+        }
+
+
+PASS = Tonemap

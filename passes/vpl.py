@@ -1,0 +1,57 @@
+"""Cast VPLs (Keller 1997) on the CPU: -> lights, the spotlight's record and then one for each living VPL."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from deferred_ir.frame import Frame
+from deferred_ir.graph import Buffer, Description, Output, Pass
+from deferred_ir.io import Io
+from deferred_ir.lights import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, light_records
+from deferred_ir.params import param
+from deferred_ir.sampling import Pattern
+from deferred_ir.vpls import NONE, cast
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of the VPLs."""
+
+    count: int = param(64, lo=0, hi=65536, doc="Rays that leave the spotlight; each that lands makes a VPL.")
+    pattern: Pattern = param("sobol", doc="Sample pattern on the disc of directions.")
+    fov: float = param(150.0, lo=1.0, hi=179.9, doc="Full opening angle of the cone a VPL shines into, degrees.")
+    clamp: float = param(
+        0.02, lo=0.0, hi=10.0, doc="Distance below which 1/d^2 is held, as a fraction of the scene's diagonal."
+    )
+
+
+class Vpl(Pass):
+    """Traces `count` rays from the spotlight and packs what they make for the shaders."""
+
+    Params = Params
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """One buffer with room for all rays."""
+        del inputs
+        records = Buffer("light", 1 + self.params.count, LIGHT.itemsize, LIGHTS_PER_BLOCK)
+        return {"lights": Output("the spotlight, then the VPLs", records, {"LIGHTS_PER_BLOCK": LIGHTS_PER_BLOCK})}
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Cast, pack, upload."""
+        light, p = frame.scene.spotlight, self.params
+        shines = p.count > 0 and any(light.emission)
+        vpls = cast(light, frame.tracer(), p.count, p.pattern, frame.seed) if shines else NONE
+        spot = light_records(
+            np.array([light.position]), light.axis[None], np.array([light.emission]), fov=light.fov, tile=SPOT_TILE
+        )
+        tiles = np.arange(len(vpls))
+        records = light_records(vpls.position, vpls.normal, vpls.emission, fov=p.fov, tile=tiles)
+        records["clamp_squared"] = (p.clamp * frame.scene.geometry.diagonal) ** 2
+        io["lights"].write(np.concatenate([spot, records]))
+        io.count("vpls_alive", len(vpls))
+
+
+PASS = Vpl

@@ -1,0 +1,38 @@
+// Radiance from the spotlight, or from LIGHTS_PER_DRAW VPLs or fewer, each with a depth map of its own; blending adds up
+// the draws.
+#include "lib/surface.glsl"
+#include "lib/shadow.glsl"
+
+layout(binding = UNIT_PRIMITIVES) uniform usampler2D primitives;
+#if SPOT
+layout(binding = UNIT_MAPS) uniform sampler2DShadow spot;
+#else
+layout(binding = UNIT_MAPS) uniform sampler2DShadow vpls[LIGHTS_PER_DRAW];
+uniform int first;  // light of this block that vpls[0] belongs to
+uniform int count;  // lights of this draw
+#endif
+
+layout(location = 0) out vec4 radiance;
+
+float visibility(sampler2DShadow map, Light light, float size, float offset, Surface s) {
+    vec3 seen = shadow_lookup(light, s.position, s.normal, size, offset);
+    return texture(map, vec3(map_uv(seen.xy, size), seen.z));
+}
+
+void main() {
+    if (texelFetch(primitives, ivec2(gl_FragCoord.xy), 0).r != uint(face_number() + 1)) discard;
+    Surface s = surface();
+    vec3 irradiance = vec3(0.0);
+#if SPOT
+    irradiance = spot_irradiance(lights[0], s.position, s.normal, s.shading_normal)
+               * visibility(spot, lights[0], SPOT_SIZE, SPOT_OFFSET, s);
+#else
+    for (int i = 0; i < LIGHTS_PER_DRAW; ++i) {
+        if (i >= count) break;
+        irradiance += vpl_irradiance(lights[first + i], s.position, s.normal, s.shading_normal)
+                    * visibility(vpls[i], lights[first + i], VPL_SIZE, VPL_OFFSET, s);
+    }
+#endif
+    radiance = vec4(s.albedo * irradiance * INVERSE_PI, 1.0);
+    WRITE_DEPTH(frame.near);
+}

@@ -1,0 +1,19 @@
+// The shadow atlas: layers of ATLAS_SIZE^2 texels; the spotlight owns layer 0, VPL tile t a square of VPL_SIZE^2 on the
+// layers behind it, row by row.
+#include "lib/shadow.glsl"
+
+const int TILES = ATLAS_SIZE / VPL_SIZE;  // in a row
+
+// xy: lower left corner, z: edge, in [0, 1] of the layer; w: the layer.
+vec4 atlas_tile(Light light) {
+    if (light.tile < 0.0) return vec4(0.0, 0.0, float(SPOT_SIZE) / float(ATLAS_SIZE), 0.0);
+    uint tile = uint(light.tile), on_layer = tile % uint(TILES * TILES);
+    const float edge = float(VPL_SIZE) / float(ATLAS_SIZE);
+    return vec4(vec2(on_layer % uint(TILES), on_layer / uint(TILES)) * edge, edge, 1u + tile / uint(TILES * TILES));
+}
+
+float atlas_visibility(sampler2DArrayShadow atlas, Light light, float size, float offset, vec3 position, vec3 normal) {
+    vec3 seen = shadow_lookup(light, position, normal, size, offset);
+    vec4 tile = atlas_tile(light);
+    return texture(atlas, vec4(tile.xy + map_uv(seen.xy, size) * tile.z, tile.w, seen.z));
+}

@@ -1,0 +1,20 @@
+// Encoding of the G-buffer's normals: two unit vectors as octahedral maps, in the four 16-bit channels of one texel
+// (Cigolle et al. 2014).
+
+vec2 octahedral(vec3 n) {
+    n /= abs(n.x) + abs(n.y) + abs(n.z);  // a unit vector: the sum is at least 1
+    vec2 folded = (1.0 - abs(n.yx)) * vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0);
+    return (n.z < 0.0 ? folded : n.xy) * 0.5 + 0.5;
+}
+
+vec3 from_octahedral(vec2 code) {
+    vec2 p = code * 2.0 - 1.0;
+    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
+    float fold = max(-n.z, 0.0);
+    n.xy -= vec2(n.x < 0.0 ? -fold : fold, n.y < 0.0 ? -fold : fold);
+    return normalize(n);
+}
+
+vec4 encode_normals(vec3 shading, vec3 geometric) {
+    return vec4(octahedral(shading), octahedral(geometric));
+}

@@ -1,0 +1,40 @@
+// Radiance from the spotlight and one block of lights; further blocks are added by blending.
+#include "lib/frame.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/light.glsl"
+#if HAS_SHADOWS
+#include "lib/atlas.glsl"
+layout(binding = UNIT_SHADOWS) uniform sampler2DArrayShadow shadows;
+#define VISIBILITY(light, kind) atlas_visibility(shadows, light, kind##_SIZE, kind##_OFFSET, position, normal)
+#else
+#define VISIBILITY(light, kind) 1.0
+#endif
+
+layout(binding = UNIT_DEPTH) uniform sampler2D depth;
+layout(binding = UNIT_NORMALS) uniform sampler2D normals;
+layout(binding = UNIT_ALBEDO) uniform sampler2D albedo;
+uniform int first;  // light of this block to start with; 1 where light 0 is the spotlight
+uniform int count;  // lights of this block
+
+in vec2 ndc;
+layout(location = 0) out vec4 radiance;
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    float d = texelFetch(depth, pixel, 0).r;
+    if (d <= 0.0) {  // background
+        radiance = vec4(0.0);
+        return;
+    }
+    vec3 position = unproject(ndc, d);
+    vec4 code = texelFetch(normals, pixel, 0);
+    vec3 shading_normal = from_octahedral(code.xy), normal = from_octahedral(code.zw);
+    vec3 irradiance = vec3(0.0);
+    if (first == 1)
+        irradiance = spot_irradiance(lights[0], position, normal, shading_normal)
+                   * VISIBILITY(lights[0], SPOT);
+    for (int i = first; i < count; ++i)
+        irradiance += vpl_irradiance(lights[i], position, normal, shading_normal)
+                    * VISIBILITY(lights[i], VPL);
+    radiance = vec4(texelFetch(albedo, pixel, 0).rgb * irradiance * INVERSE_PI, 1.0);
+}

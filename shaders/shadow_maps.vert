@@ -1,0 +1,29 @@
+// One instance a light: the scene as that light sees it, moved into its tile of the atlas.
+#if LAYER_FROM_VERTEX
+#extension GL_ARB_shader_viewport_layer_array : require
+#endif
+#include "lib/atlas.glsl"
+
+uniform int first;  // light of this block that instance 0 draws
+in vec3 position;
+out float gl_ClipDistance[4];
+#if !LAYER_FROM_VERTEX
+flat out int layer;
+#endif
+
+void main() {
+    Light light = lights[first + gl_InstanceID];
+    vec4 clip = light_clip(light, position);
+    vec4 tile = atlas_tile(light);
+    // The four sides of the map: the hardware clips at those of the whole layer only.
+    gl_ClipDistance[0] = clip.w + clip.x;
+    gl_ClipDistance[1] = clip.w - clip.x;
+    gl_ClipDistance[2] = clip.w + clip.y;
+    gl_ClipDistance[3] = clip.w - clip.y;
+    gl_Position = vec4(clip.xy * tile.z + (tile.xy * 2.0 + tile.z - 1.0) * clip.w, clip.zw);
+#if LAYER_FROM_VERTEX
+    gl_Layer = int(tile.w);
+#else
+    layer = int(tile.w);
+#endif
+}

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import glm
 import numpy as np
+from pyglm import glm
 
 from .motion import CameraMotion
 from .typing import Array, Vec3

@@ -129,7 +129,8 @@ class _Reader:
             vertices, faces = vertices[corners], np.arange(len(corners)).reshape(-1, 3)
             normals = None if normals is None else normals[corners]
             uvs, colors = (None if uvs is None else uvs[corners]), np.repeat(colors, 3, axis=0)
-        positions = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        with np.errstate(all="ignore"):  # NaN and infinity are told of next
+            positions = vertices @ matrix[:3, :3].T + matrix[:3, 3]
         self._check(positions)
         linear = matrix[:3, :3] / max(float(np.abs(matrix[:3, :3]).max()), 1e-300)
         if np.linalg.det(linear) < 0:

@@ -27,7 +27,8 @@ def texture(size: int = 512, squares: int = 4) -> np.ndarray:
     half = np.arange(size) * 2 // size
     square = np.arange(size) * 2 * squares // size
     tone = (square[:, None] + square[None, :]) % 2
-    return np.array(PATCHES, dtype=np.uint8)[half[:, None], half[None, :], tone]
+    tones: np.ndarray = np.array(PATCHES, dtype=np.uint8)[half[:, None], half[None, :], tone]
+    return tones
 
 
 def sphere(center: tuple[float, float, float], radius: float, rings: int = 24) -> tuple[Array, Array, list[list[int]]]:
@@ -117,7 +118,7 @@ def model() -> str:
         ("small_sphere", (0.55, 0.36, 0.75), 0.36),
     ):
         positions, normals, faces = sphere(center, radius)
-        obj.add(name, "white", positions, faces, vn=normals)
+        obj.add(name, "gypsum", positions, faces, vn=normals)
     obj.add("block", "grey", *block((1.2, -1.5), (0.8, 1.5, 0.8), 28.0))
     return "\n".join(obj.lines) + "\n"
 

@@ -17,16 +17,11 @@ from .frame import Frame
 from .gl.gpu import Gpu
 from .gl.scene_buffers import SceneBuffers
 from .gl.timers import Timers
-from .graph import Facts, Graph, Pass, Plan, compile
+from .graph import Graph, Pass, Plan, compile
 from .image import Image
 from .scene import Geometry, Scene
 from .timing import Record
 from .tracing import Tracer
-
-
-def facts(scene: Scene) -> Facts:
-    """What compile() may know of a scene."""
-    return Facts(emits=any(scene.spotlight.emission))
 
 
 class Renderer:
@@ -75,7 +70,7 @@ class Renderer:
 
     def plan(self, scene: Scene, vpls: int | None = None, outputs: Sequence[str] | None = None) -> Plan:
         """What a frame of `scene` runs; `outputs` are all that the graph has unless some are named."""
-        graph, known = self.graph(vpls), facts(scene)
+        graph, known = self.graph(vpls), scene.facts
         wanted = tuple(graph.outputs if outputs is None else outputs)
         key = (vpls, known, wanted)
         if key not in self._plans:
@@ -135,7 +130,7 @@ class Renderer:
         return self._tracer.seconds if self._tracer else 0.0
 
     def _upload(self, scene: Scene) -> None:
-        """Put the scene's geometry on the device unless it is there; the same geometry may have a new camera or light."""
+        """Put the geometry on the device unless it is there; the same one may come with a new camera or light."""
         if scene.geometry is self._geometry:
             return
         self._forget()

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from .camera import Camera
+from .graph import Facts
 from .lights import Spotlight
 from .motion import ModelMotion
 from .typing import Array, Ints
@@ -138,6 +139,11 @@ class Scene:
         motions = tuple(model.motion for model in self.models)
         digest.update(repr((self.materials, self.camera, self.spotlight, motions)).encode())
         return digest.hexdigest()[:16]
+
+    @property
+    def facts(self) -> Facts:
+        """What planning a frame may know of the scene."""
+        return Facts(emits=any(self.spotlight.emission))
 
     def at(self, time: float) -> Scene:
         """The scene with its camera and spotlight at `time` seconds."""

@@ -1,7 +1,7 @@
 """The assignment's way, kept as the baseline: the scene is drawn for each light and added up by blending.
 
-lights, depth and primitives of the prepass, a plain depth map for each light -> radiance. Positions are interpolated from
-the vertices; nothing comes from a G-buffer.
+lights, depth and primitives of the prepass, a plain depth map for each light -> radiance. Positions are interpolated
+from the vertices; nothing comes from a G-buffer.
 """
 
 from __future__ import annotations

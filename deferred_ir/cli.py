@@ -1,0 +1,159 @@
+"""The command line: `deferred-ir COMMAND ...`. Faults are one line and exit status 2."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from .errors import Error, SettingError
+
+SET_HELP = "a parameter of a pass, e.g. --set shadow_maps.vpl_size=512; may be repeated"
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse with its faults in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and where to look."""
+        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit status."""
+    arguments = _parser().parse_args(argv)
+    try:
+        status: int = arguments.run(arguments)
+        sys.stdout.flush()
+        return status
+    except Error as error:
+        print(f"deferred-ir: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("deferred-ir: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # Whoever read the output has gone; keep Python from complaining about it at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+
+
+def _parser() -> Parser:
+    parser = Parser(prog="deferred-ir", description="Global illumination in milliseconds, on OpenGL.")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    def command(name: str, run: Any, text: str) -> Parser:
+        added = commands.add_parser(name, help=text, description=text)
+        added.set_defaults(run=run)
+        assert isinstance(added, Parser)
+        return added
+
+    render = command("render", _render, "Render a scene to images.")
+    render.add_argument("scene", metavar="SCENE", help="a built-in scene, a scene file (.toml) or a model")
+    render.add_argument(
+        "-o", "--output", action="append", default=[], metavar="OUT", help="image: .png, .exr or .npy; may be repeated"
+    )
+    render.add_argument("--graph", metavar="NAME|FILE", help="render graph (default: deferred)")
+    render.add_argument("--size", metavar="WxH", help="pixels (default: 512x512)")
+    render.add_argument("--vpls", type=_count, metavar="N", help="virtual point lights (default: 64)")
+    render.add_argument("--seed", type=_count, metavar="N", help="of the samples (default: 0)")
+    render.add_argument("--device", default="auto", metavar="D", help="see `deferred-ir devices` (default: auto)")
+    render.add_argument("--frames", type=_positive, default=1, metavar="N", help="frame i shows time i/30 s")
+    render.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
+    render.add_argument("--json", metavar="RUN.json", help="write what was rendered, and how long it took")
+
+    graph = command("graph", _graph, "Show what a render graph runs, in what order, and what it leaves out.")
+    graph.add_argument("graph", metavar="NAME|FILE", help="a built-in graph or a graph file")
+    graph.add_argument("--scene", metavar="SCENE", help="plan for this scene")
+    graph.add_argument("--vpls", type=_count, metavar="N", help="virtual point lights")
+    graph.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
+    graph.add_argument("--dot", action="store_true", help="print Graphviz source")
+
+    command("scenes", _scenes, "List the built-in scenes.")
+    doctor = command("doctor", _doctor, "Check this machine, and say how to mend what is missing.")
+    doctor.add_argument("--device", default="auto", metavar="D", help="the device to check (default: auto)")
+    command("devices", _devices, "List the devices that OpenGL can run on.")
+    return parser
+
+
+def _count(text: str) -> int:
+    return _whole(text, 0)
+
+
+def _positive(text: str) -> int:
+    return _whole(text, 1)
+
+
+def _whole(text: str, least: int) -> int:
+    if not text.isascii() or not text.isdecimal() or int(text) < least:
+        raise argparse.ArgumentTypeError(f"'{text}' is no whole number from {least} up")
+    return int(text)
+
+
+def settings(pairs: Sequence[str]) -> dict[str, Any]:
+    """{"pass.param": value} of `--set` arguments."""
+    from .params import read_value
+
+    result = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals:
+            raise SettingError(f"--set {pair}: wants PASS.PARAM=VALUE")
+        result[key.strip()] = read_value(value.strip())
+    return result
+
+
+def _render(arguments: argparse.Namespace) -> int:
+    from .render_command import render
+
+    return render(arguments, settings(arguments.set))
+
+
+def _graph(arguments: argparse.Namespace) -> int:
+    from . import config, plan_text
+    from .graph import Facts, compile
+
+    chosen, facts = settings(arguments.set), Facts()
+    if arguments.scene is not None:
+        from .loading import load
+
+        scene = load(arguments.scene)
+        facts = scene.facts
+        chosen = {**scene.render.set, **chosen}
+        if scene.render.vpls is not None:
+            chosen.setdefault("vpl.count", scene.render.vpls)
+    if arguments.vpls is not None:
+        chosen["vpl.count"] = arguments.vpls
+    graph = config.load_graph(arguments.graph, chosen)
+    plan = compile(graph, list(graph.outputs), facts)
+    print(plan_text.dot(graph, plan) if arguments.dot else plan_text.summary(plan))
+    return 0
+
+
+def _scenes(arguments: argparse.Namespace) -> int:
+    del arguments
+    from .loading import builtin_scenes
+
+    scenes = builtin_scenes()
+    width = max(len(name) for name, _ in scenes)
+    for name, text in scenes:
+        print(f"{name:<{width}}  {text}")
+    return 0
+
+
+def _doctor(arguments: argparse.Namespace) -> int:
+    from . import doctor
+
+    results = doctor.checks(arguments.device)
+    print(doctor.report(results))
+    return 0 if doctor.healthy(results) else 1
+
+
+def _devices(arguments: argparse.Namespace) -> int:
+    del arguments
+    from .doctor import devices_table
+
+    print(devices_table())
+    return 0

@@ -1,0 +1,53 @@
+"""RUN.json: what was rendered, on what, how long each pass took and what was left out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from .config import graph_hash
+from .graph import Graph, Plan
+from .image import write_whole
+from .renderer import Renderer
+from .scene import Scene
+from .timing import Record
+
+
+def run_record(
+    renderer: Renderer, scene: Scene, graph_name: str, graph: Graph, plan: Plan, *, seed: int, record: Record
+) -> dict[str, Any]:
+    """The record of a run as plain data, in the order of the contract."""
+    casting = graph.nodes.get("vpl")
+    last = record.counters[-1]
+    passes = record.passes()
+    for entry in passes:
+        step = next(step for step in plan.steps if step.name == entry["name"])
+        subpasses = step.work.subpasses(step.descriptions)
+        if subpasses:
+            alive = subpasses[: last.get("maps_drawn", len(subpasses))]
+            entry["subpasses"] = [dict(subpass) for subpass in alive]
+    return {
+        "scene": scene.name,
+        "scene_hash": scene.hash,
+        "chosen": dict(scene.chosen),
+        "graph": graph_name,
+        "graph_hash": graph_hash(graph),
+        "size": list(renderer.size),
+        "vpls": getattr(casting.work.params, "count", 0) if casting else 0,
+        "vpls_alive": last.get("vpls_alive", 0),
+        "seed": seed,
+        "device": renderer.gpu.device.name,
+        "frames": len(record.frame_ms),
+        "frame_ms": record.median_frame_ms(),
+        "passes": passes,
+        "maps_drawn": [counters.get("maps_drawn", 0) for counters in record.counters],
+        "left_out": [{"what": name, "why": why, "ms": None, "bytes": None} for name, why in plan.left_out.items()],
+        "memory_bytes": renderer.memory(),
+    }
+
+
+def write(path: Path, data: dict[str, Any]) -> None:
+    """Write JSON whole or not at all."""
+    text = json.dumps(data, indent=1) + "\n"
+    write_whole(path, lambda part: part.write_text(text, encoding="utf-8") and None)

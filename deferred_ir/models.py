@@ -61,7 +61,7 @@ class _Reader:
     def __init__(self, path: Path, data: bytes) -> None:
         self.path = path
         self.notes: list[str] = []
-        self.images: dict[str, str] = {}
+        self.mtl: dict[str, obj.MtlMaterial] = {}
         self.base_colors: tuple[gltf.BaseColor, ...] | None = None
         self.textures: dict[int, Texture] = {}
         self.format = path.name.lower().rpartition(".")[2]
@@ -73,7 +73,7 @@ class _Reader:
             self.format = "gltf"
         elif self.format == "obj":
             text = obj.read(path, data)
-            data, self.assets, self.images = text.text, text.assets, text.images
+            data, self.assets, self.mtl = text.text, text.assets, text.materials
             self.notes += text.notes
         self.data = data
 
@@ -194,18 +194,19 @@ class _Reader:
 
     def _simple_reflectance(self, source: Any, where: str, plain: Vec3) -> tuple[str, Vec3, Any, str]:
         image = getattr(source, "image", None)
+        material = self.mtl.get(source.name, obj.MtlMaterial())
         if image is not None and image.format is None:
-            image = None  # not from a file: trimesh's filler where there is no material
-        wanted = self.images.get(source.name, "") if self.format == "obj" else self._ply_image()
+            # Not from a file: trimesh's filler where there is no material.
+            image, material = None, obj.MtlMaterial()
+        wanted = material.image or self._ply_image()
         if wanted and image is None:
             state = "not a readable image" if self.assets.path(wanted) else "missing"
             raise SceneError(f"{where}: image {wanted} is {state}; put it next to the model or take it out")
-        values = getattr(source, "kwargs", {})
-        if self.format == "obj" and values and "kd" not in values and image is None:
+        if source.name in self.mtl and not material.kd and image is None:
             self.notes.append(f"{self.path.name}: material {source.name} has no Kd that can be read; it is grey")
-        if any(_is_above_zero(word) for word in np.ravel(values.get("ke", ()))):
+        if material.emits:
             self.notes.append(f"{self.path.name}: emission (Ke) is ignored")
-        albedo = checked_albedo(values["kd"], where, self.notes) if "kd" in values else plain
+        albedo = checked_albedo(material.kd, where, self.notes) if material.kd else plain
         return source.name, albedo, image, wanted or f"texture of {source.name}"
 
     def _ply_image(self) -> str:
@@ -238,13 +239,6 @@ class _Reader:
         if self.base_colors is not None:
             return np.clip(values, 0, 1)
         return linear_from_srgb(values / 255 if values.max() > 1 else values)
-
-
-def _is_above_zero(word: Any) -> bool:
-    try:
-        return float(word) > 0
-    except ValueError:
-        return False
 
 
 def _turned_normals(normals: Array, linear: Array) -> Array:

@@ -1,13 +1,13 @@
 """What trimesh passes over in OBJ and MTL files, mended before it reads them.
 
 trimesh knows one `mtllib`, finds the word even in a comment, counts negative indices from the end of the whole file,
-and skips missing materials and images without a word.
+skips missing materials and images without a word, and rounds Kd to 8 bits.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from .assets import Assets, without_options
@@ -18,12 +18,21 @@ MATERIALS = "materials.mtl"
 
 
 @dataclass(frozen=True)
+class MtlMaterial:
+    """What we take of a material: the numbers of Kd (unrounded, may be none), its image, and whether it emits."""
+
+    kd: tuple[float, ...] = ()
+    image: str | None = None
+    emits: bool = False
+
+
+@dataclass(frozen=True)
 class ObjFile:
-    """An OBJ file made ready: text for trimesh, its assets, the image each material names, and notes."""
+    """An OBJ file made ready: text for trimesh, its assets, its materials by name, and notes."""
 
     text: bytes
     assets: Assets
-    images: dict[str, str]
+    materials: dict[str, MtlMaterial]
     notes: tuple[str, ...]
 
 
@@ -31,21 +40,22 @@ def read(path: Path, data: bytes) -> ObjFile:
     """Make the OBJ file `data` at `path` ready for trimesh; all its material libraries become one."""
     text = _decoded(data)
     assets = Assets([path.parent])
-    materials, notes = [], []
+    libraries, notes = [], []
     for names in re.findall(r"^[ \t]*mtllib[ \t]+(.*)", text, re.MULTILINE):
         for name in _library_names(names.strip(), assets):
             found = assets.path(name)
             if found is None:
                 notes.append(f"{path.name}: its material file {name} is missing")
                 continue
-            materials.append(_decoded(found.read_bytes()))
+            libraries.append(_decoded(found.read_bytes()))
             if found.parent not in assets.folders:
                 assets.folders.append(found.parent)
-    mtl = "\n".join(materials)
-    assets.blobs[MATERIALS] = mtl.encode()
-    defined = {" ".join(name.split()) for name in re.findall(r"^\s*newmtl[ \t]+(.*)", mtl, re.MULTILINE)}
+    materials = _materials("\n".join(libraries))
+    # A value that trimesh does not expect, of whatever key, would cost it all materials: it gets names and images only.
+    lines = ((f"newmtl {name}", f"map_Kd {m.image}" if m.image else "") for name, m in materials.items())
+    assets.blobs[MATERIALS] = "\n".join(line for pair in lines for line in pair).encode()
     used = {" ".join(name.split()) for name in re.findall(r"^usemtl[ \t]+(.*)", text, re.MULTILINE)}
-    if missing := sorted(used - defined):
+    if missing := sorted(used - materials.keys()):
         notes.append(f"{path.name}: no material {', '.join(missing)}; its surfaces are grey")
     text = re.sub(r"^.*\bmtllib\b.*$", "", text, flags=re.MULTILINE)
     text = f"mtllib {MATERIALS}\n{_with_absolute_indices(text)}"
@@ -53,7 +63,7 @@ def read(path: Path, data: bytes) -> ObjFile:
         raise SceneError(
             f"{path}: a face has index 0, or one before the first vertex; export it again, counting from 1"
         )
-    return ObjFile(text.encode(), assets, _images(mtl), tuple(notes))
+    return ObjFile(text.encode(), assets, materials, tuple(notes))
 
 
 def _decoded(data: bytes) -> str:
@@ -69,16 +79,31 @@ def _library_names(names: str, assets: Assets) -> list[str]:
     return [names] if assets.path(names) or " " not in names else names.split()
 
 
-def _images(mtl: str) -> dict[str, str]:
-    """The file name in the map_Kd of each material that has one."""
-    images, material = {}, ""
+def _materials(mtl: str) -> dict[str, MtlMaterial]:
+    """The materials of an MTL text by name; of two of one name the later counts."""
+    materials: dict[str, MtlMaterial] = {}
+    name = ""
     for line in mtl.splitlines():
         key, *rest = line.split(maxsplit=1) or [""]
-        if rest and key.lower() == "newmtl":
-            material = " ".join(rest[0].split())
-        elif rest and key.lower() == "map_kd":
-            images[material] = without_options(rest[0]).strip()
-    return images
+        key, value = key.lower(), rest[0] if rest else ""
+        if key == "newmtl":
+            name = " ".join(value.split())
+            materials[name] = MtlMaterial()
+        elif name and key == "kd":
+            materials[name] = replace(materials[name], kd=_numbers(value))
+        elif name and key == "map_kd" and value.strip():
+            materials[name] = replace(materials[name], image=without_options(value).strip())
+        elif name and key == "ke":
+            materials[name] = replace(materials[name], emits=any(number > 0 for number in _numbers(value)))
+    return materials
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    """The numbers of a line up to a comment; none where something else stands there, such as `spectral file.rfl`."""
+    try:
+        return tuple(float(word) for word in text.partition("#")[0].split())
+    except ValueError:
+        return ()
 
 
 def _with_absolute_indices(text: str) -> str:

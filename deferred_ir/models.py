@@ -34,7 +34,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class ModelData:
-    """What one model file holds: its parts in file order, and notes on what is not honoured."""
+    """What one model file holds: its parts in a fixed order, and notes on what is not honoured."""
 
     name: str
     parts: tuple[Part, ...]

@@ -12,12 +12,12 @@ import numpy as np
 
 from deferred_ir.typing import Array
 
-WIDTH, HEIGHT, DEPTH = 5.0, 3.4, 7.5
+WIDTH, HEIGHT, DEPTH = 5.0, 2.8, 7.5
 """Of the room, in metres. The texture covers 5 m x 5 m of the floor, so that it repeats half once more along z."""
 
 PATCHES = (
-    (((206, 32, 28), (232, 58, 40)), ((24, 62, 206), (44, 96, 232))),
-    (((240, 182, 20), (252, 214, 60)), ((22, 150, 58), (56, 184, 76))),
+    (((222, 40, 34), (244, 72, 52)), ((30, 84, 224), (52, 118, 248))),
+    (((246, 192, 24), (255, 222, 64)), ((26, 172, 66), (64, 206, 88))),
 )
 """sRGB of the texture's quarters, top row first; each is a checker of two tones."""
 

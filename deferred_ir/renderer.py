@@ -104,7 +104,8 @@ class Renderer:
 
     def finish(self, record: Record) -> None:
         """Add the timestamps still in flight to `record`."""
-        record.laps += self._timers.collect(wait=True)
+        with self.gpu.ctx:
+            record.laps += self._timers.collect(wait=True)
 
     def read(self, plan: Plan) -> Image:
         """The image that the last `draw` of `plan` made."""

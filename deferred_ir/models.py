@@ -246,10 +246,16 @@ def _turned_normals(normals: Array, linear: Array) -> Array:
     # The cofactor matrix is the inverse transpose times the determinant, and also serves flattened models.
     a, b, c = linear
     cofactor = np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
-    turned = normals @ cofactor.T * (np.sign(np.linalg.det(linear)) or 1.0)
-    size = np.abs(turned).max(axis=1, keepdims=True)
-    usable = np.isfinite(size) & (size > 0)
-    scaled = np.divide(turned, size, out=np.zeros_like(turned), where=usable)
-    length = np.linalg.norm(scaled, axis=1, keepdims=True)
-    unit: Array = np.divide(scaled, length, out=np.zeros_like(scaled), where=usable)
+    finite = np.where(np.isfinite(normals).all(axis=1, keepdims=True), normals, 0.0)
+    turned = _scaled(finite) @ cofactor.T * (np.sign(np.linalg.det(linear)) or 1.0)
+    turned = _scaled(turned)
+    length = np.linalg.norm(turned, axis=1, keepdims=True)
+    unit: Array = np.divide(turned, length, out=np.zeros_like(turned), where=length > 0)
     return unit
+
+
+def _scaled(rows: Array) -> Array:
+    """Rows (n, 3) divided by their largest parts, so that squares neither overflow nor vanish; zeros stay."""
+    size = np.abs(rows).max(axis=1, keepdims=True)
+    scaled: Array = np.divide(rows, size, out=np.zeros_like(rows), where=size > 0)
+    return scaled

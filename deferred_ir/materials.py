@@ -23,9 +23,7 @@ GREY = (0.8, 0.8, 0.8)
 @lru_cache(maxsize=1)
 def srgb_table() -> Array:
     """Linear values of the 256 sRGB levels (IEC 61966-2-1), float32 (256,)."""
-    levels = np.arange(256) / 255
-    linear = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
-    table = linear.astype(np.float32)
+    table = linear_from_srgb(np.arange(256) / 255).astype(np.float32)
     table.flags.writeable = False
     return table
 

@@ -93,8 +93,8 @@ class Executor:
             attached = {port: inputs[port] for port, declared in step.work.inputs.items() if declared.attach}
             targets = {port: r for port, r in {**outputs, **attached}.items() if isinstance(r, GpuTexture)}
             if targets:
-                io.framebuffer = Framebuffer(self.gpu, targets, step.name)
-                self._framebuffers.append(io.framebuffer)
+                self._framebuffers.append(Framebuffer(self.gpu, targets, step.name))
+                io.attach(self._framebuffers[-1])
             self._ios.append(io)
         self._plan, self._size = plan, size
 

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from .errors import OutputError, did_you_mean
-from .typing import Array
 
 SUFFIXES = (".png", ".npy", ".exr")
 
@@ -23,7 +22,7 @@ class Image:
     display: uint8 (H, W, 3), sRGB, tone-mapped by the graph, or None likewise.
     """
 
-    radiance: Array
+    radiance: Any
     display: Any
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -40,15 +39,20 @@ class Image:
             raise OutputError(f"{path.name}: this graph has no output 'display' to write as PNG; save .npy or .exr")
         PIL.Image.fromarray(self.display).save(path, format="PNG")
 
+    def _linear(self, path: Path) -> Any:
+        if self.radiance is None:
+            raise OutputError(f"{path.name}: this graph has no output 'radiance' to write; save .png")
+        return self.radiance
+
     def _npy(self, path: Path) -> None:
         with path.open("wb") as file:
-            np.save(file, self.radiance)
+            np.save(file, self._linear(path))
 
     def _exr(self, path: Path) -> None:
         import OpenEXR
 
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-        with OpenEXR.File(header, {"RGB": np.ascontiguousarray(self.radiance, np.float32)}) as file:
+        with OpenEXR.File(header, {"RGB": np.ascontiguousarray(self._linear(path), np.float32)}) as file:
             file.write(str(path))
 
 

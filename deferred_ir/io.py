@@ -13,6 +13,7 @@ from .gl.shaders import Program, ShaderLibrary
 from .graph import Pass, Step
 from .params import specs
 
+NO_DEFINES: Mapping[str, int | float] = {}
 Resource = GpuTexture | GpuBuffer | list[GpuTexture]
 SCENE_SAMPLERS = {"albedo_texture"}
 """Samplers that SceneBuffers binds; all others must be ports."""
@@ -34,7 +35,7 @@ class Io:
     ) -> None:
         self._library, self._step, self._ports, self._counters = library, step, ports, counters
         self.gpu = library.gpu
-        self.framebuffer: Framebuffer | None = None
+        self._framebuffer: Framebuffer | None = None
         self._programs: dict[Any, Program] = {}
         textures = [name for name in step.work.inputs if isinstance(ports[name], GpuTexture)]
         sampled = [name for name in textures if not step.work.inputs[name].attach]
@@ -52,23 +53,37 @@ class Io:
             raise KeyError(f"{self._step.name} declares no port '{port}'; it has: {', '.join(self._ports)}")
         return self._ports[port]
 
+    @property
+    def framebuffer(self) -> Framebuffer:
+        """The pass's textures as a render target, bound when `execute` begins."""
+        if self._framebuffer is None:
+            raise ValueError(f"{self._step.name}: has no output to draw into")
+        return self._framebuffer
+
+    def attach(self, framebuffer: Framebuffer) -> None:
+        """Give the pass its render target."""
+        self._framebuffer = framebuffer
+
     def bind(self) -> None:
         """Bind the framebuffer and all sampled inputs."""
-        if self.framebuffer:
-            self.framebuffer.bind()
+        if self._framebuffer:
+            self._framebuffer.bind()
         for name, unit in self._units.items():
             port = self._step.work.inputs[name]
             self[name].bind(unit, self.gpu.sampler(port.linear, port.compare))
 
     def program(
-        self, fragment: str | None, vertex: str = "fullscreen.vert", geometry: str | None = None, **defines: int | float
+        self,
+        fragment: str | None,
+        vertex: str = "fullscreen.vert",
+        geometry: str | None = None,
+        defines: Mapping[str, int | float] = NO_DEFINES,
     ) -> Program:
         """The program of these shader files, with the defines of this pass's ports and `defines`."""
         key = (fragment, vertex, geometry, *defines.items())
         if key not in self._programs:
-            program = self._library.program(
-                fragment, vertex, geometry, self._defines | defines, self._step.work.shader_folder
-            )
+            folder = self._step.work.shader_folder
+            program = self._library.program(fragment, vertex, geometry, {**self._defines, **defines}, folder)
             unknown = program.samplers - SCENE_SAMPLERS - set(self._step.work.inputs)
             if unknown:
                 raise ShaderError(f"{program.name}: sampler '{min(unknown)}' is no input of pass {self._step.name}")

@@ -20,7 +20,7 @@ def run_record(
     """The record of a run as plain data, in the order of the contract."""
     casting = graph.nodes.get("vpl")
     last = record.counters[-1]
-    passes = record.passes()
+    passes: list[dict[str, Any]] = [dict(entry) for entry in record.passes()]
     for entry in passes:
         step = next(step for step in plan.steps if step.name == entry["name"])
         subpasses = step.work.subpasses(step.descriptions)
@@ -50,4 +50,8 @@ def run_record(
 def write(path: Path, data: dict[str, Any]) -> None:
     """Write JSON whole or not at all."""
     text = json.dumps(data, indent=1) + "\n"
-    write_whole(path, lambda part: part.write_text(text, encoding="utf-8") and None)
+
+    def fill(part: Path) -> None:
+        part.write_text(text, encoding="utf-8")
+
+    write_whole(path, fill)

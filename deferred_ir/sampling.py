@@ -37,7 +37,8 @@ def _points(pattern: Pattern, count: int, seed: int) -> Array:
         return np.asarray(qmc.Halton(2, rng=rng).random(count))
     # A Sobol set of 2^m points is balanced; of another count, its first points are taken. Asking for all 2^m keeps
     # SciPy from warning about what `count` says already.
-    return np.asarray(qmc.Sobol(2, rng=rng).random_base2(int(np.ceil(np.log2(count)))))[:count]
+    points: Array = qmc.Sobol(2, rng=rng).random_base2(int(np.ceil(np.log2(count))))[:count]
+    return points
 
 
 def _stratified(count: int, rng: np.random.Generator) -> Array:

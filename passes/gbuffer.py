@@ -32,7 +32,7 @@ class GBuffer(Pass):
         ctx = io.gpu.ctx
         ctx.enable(ctx.DEPTH_TEST)
         ctx.depth_func = ">"
-        frame.buffers.draw(io.program("gbuffer.frag", "scene.vert", **frame.buffers.defines))
+        frame.buffers.draw(io.program("gbuffer.frag", "scene.vert", defines=frame.buffers.defines))
 
 
 PASS = GBuffer

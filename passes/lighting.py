@@ -7,6 +7,7 @@ a block holds are drawn block by block and added in 32-bit floats.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
@@ -17,7 +18,7 @@ from deferred_ir.lights import LIGHTS_PER_BLOCK
 class Lighting(Pass):
     """Reflected radiance rho/pi * sum of I(w) cos V / d^2, linear RGB."""
 
-    inputs: Mapping[str, Input] = {
+    inputs: ClassVar[Mapping[str, Input]] = {
         "lights": Input("the spotlight, then the VPLs", format="light"),
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),

@@ -28,7 +28,7 @@ class Prepass(Pass):
         ctx.enable(ctx.DEPTH_TEST)
         ctx.depth_func = ">"
         # The same vertex shader as the passes that test for equality: all its outputs, though only positions are read.
-        frame.buffers.draw(io.program("prepass.frag", "scene.vert", **frame.buffers.defines))
+        frame.buffers.draw(io.program("prepass.frag", "scene.vert", defines=frame.buffers.defines))
 
 
 PASS = Prepass

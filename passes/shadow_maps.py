@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from deferred_ir.errors import GraphError
 from deferred_ir.frame import Frame
@@ -32,13 +32,15 @@ class ShadowMaps(Pass):
     """Depth as each light sees it."""
 
     Params = Params
-    inputs: Mapping[str, Input] = {"lights": Input("the lights to draw maps for", format="light")}
+    inputs: ClassVar[Mapping[str, Input]] = {"lights": Input("the lights to draw maps for", format="light")}
 
     def _tiles_per_layer(self) -> int:
-        return int(self._edge() // self.params.vpl_size) ** 2
+        row: int = self._edge() // self.params.vpl_size
+        return row * row
 
     def _edge(self) -> int:
-        return max(self.params.spot_size, self.params.vpl_size)
+        edge: int = max(self.params.spot_size, self.params.vpl_size)
+        return edge
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """The atlas, as large as the lights need."""

@@ -47,7 +47,7 @@ class Vpl(Pass):
         spot = light_records(
             np.array([light.position]), light.axis[None], np.array([light.emission]), fov=light.fov, tile=SPOT_TILE
         )
-        tiles = np.arange(len(vpls))
+        tiles = np.arange(len(vpls), dtype=np.float64)
         records = light_records(vpls.position, vpls.normal, vpls.emission, fov=p.fov, tile=tiles)
         records["clamp_squared"] = (p.clamp * frame.scene.geometry.diagonal) ** 2
         io["lights"].write(np.concatenate([spot, records]))

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from deferred_ir.scenes import shapes
 from deferred_ir.scenes.shapes import Frame, Mesh
 

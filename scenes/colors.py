@@ -31,7 +31,7 @@ def texture(size: int = 512, squares: int = 4) -> np.ndarray:
     return tones
 
 
-def sphere(center: tuple[float, float, float], radius: float, rings: int = 24) -> tuple[Array, Array, list[list[int]]]:
+def sphere(center: tuple[float, float, float], radius: float, rings: int = 40) -> tuple[Array, Array, list[list[int]]]:
     """A sphere of `rings` by 2 `rings` quads, triangles at its poles: positions (V, 3), normals (V, 3), faces."""
     around = 2 * rings
     theta = np.pi * np.arange(1, rings) / rings

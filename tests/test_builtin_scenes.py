@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from deferred_ir.scenes import atrium, colors
 from PIL import Image
 
 from deferred_ir.loading import builtin_scenes, load
 from deferred_ir.scene import Scene
+from deferred_ir.scenes import atrium, colors
 from deferred_ir.tracing import Tracer
 
 NAMES = ("atrium", "colors", "cornell")

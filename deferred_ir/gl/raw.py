@@ -57,7 +57,10 @@ class GL:
 
     def __init__(self, loader: Loader) -> None:
         self._loader = loader
-        self._type = ctypes.WINFUNCTYPE if sys.platform == "win32" else ctypes.CFUNCTYPE
+        if sys.platform == "win32":
+            self._type = ctypes.WINFUNCTYPE
+        else:
+            self._type = ctypes.CFUNCTYPE
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         result, *arguments = _SIGNATURES[name]

@@ -130,9 +130,10 @@ class ShaderLibrary:
         folders = [package_shaders()] if folder is None else [folder, package_shaders()]
         files = {"vertex_shader": vertex, "geometry_shader": geometry, "fragment_shader": fragment}
         sources = {stage: flatten(file, folders, defines) for stage, file in files.items() if file}
+        texts: dict[str, Any] = {stage: source.text for stage, source in sources.items()}
         self.compiled += 1
         try:
-            glsl = self.gpu.ctx.program(**{stage: source.text for stage, source in sources.items()})
+            glsl = self.gpu.ctx.program(**texts)
         except moderngl.Error as error:
             raise ShaderError(_locate(str(error), sources, fragment or vertex)) from error
         return Program(self.gpu, fragment or vertex, glsl, sources.values())

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, NoReturn
 
-from .errors import SceneError, did_you_mean
+from .errors import SceneError, did_you_mean, shown
 from .typing import Vec3
 
 LARGEST = 1e18
@@ -29,15 +29,6 @@ class Faults:
         """Raise a SceneError with all faults in one line."""
         faults = " ".join("; ".join(self.found).split())  # a key may hold a line break
         raise SceneError(f"{self.file}: {faults}")
-
-
-def shown(value: Any) -> str:
-    """A value as an error message shows it: on one line and not too long."""
-    try:
-        text = repr(value)
-    except ValueError:  # Python writes no integers of more than 4300 digits
-        return "a number of too many digits"
-    return text if len(text) <= 40 else f"{text[:37]}..."
 
 
 class Table:

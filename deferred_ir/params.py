@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args, get_type_hints
 
-from .errors import did_you_mean
+from .errors import did_you_mean, shown
 
 
 def param(default: Any, *, doc: str, lo: float | None = None, hi: float | None = None) -> Any:
@@ -51,21 +51,24 @@ class Spec:
 
     def fault(self, value: Any) -> str | None:
         """What is wrong with `value`, or None."""
+        if self._fits(value):
+            return None
+        hint = did_you_mean(value, self.choices) if isinstance(value, str) and not self.number else ""
+        return f"is {shown(value)}, but wants {self.wants()}" + (hint if "mean" in hint else "")
+
+    def _fits(self, value: Any) -> bool:
         if isinstance(value, str):
-            if value in self.choices:
-                return None
-            hint = did_you_mean(value, self.choices) if self.choices and not self.number else ""
-            return f"is {value!r}, but wants {self.wants()}" + (hint if "mean" in hint else "")
+            return value in self.choices
         if isinstance(value, bool) or self.number is bool:
-            return (
-                None if isinstance(value, bool) and self.number is bool else f"is {value!r}, but wants {self.wants()}"
-            )
-        whole = isinstance(value, int)
-        if self.number is None or not (whole or (isinstance(value, float) and self.number is float)):
-            return f"is {value!r}, but wants {self.wants()}"
-        low = self.lo is not None and value < self.lo
-        high = self.hi is not None and value > self.hi
-        return f"is {value!r}, but wants {self.wants()}" if low or high or not math.isfinite(value) else None
+            return isinstance(value, bool) and self.number is bool
+        if self.number is None or not isinstance(value, int if self.number is int else (int, float)):
+            return False
+        if (self.lo is not None and value < self.lo) or (self.hi is not None and value > self.hi):
+            return False
+        try:
+            return self.number is int or math.isfinite(value)
+        except OverflowError:  # a whole number beyond all floats
+            return False
 
 
 def specs(params: type) -> dict[str, Spec]:
@@ -100,6 +103,7 @@ def parse(params: type, table: Mapping[str, Any], where: str, faults: list[str])
 def read_value(text: str) -> Any:
     """The value of `--set pass.param=text`: a TOML value, else the bare text as a string."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        table = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):  # no TOML, or too long or too deeply nested for Python
         return text
+    return table["value"] if len(table) == 1 else text

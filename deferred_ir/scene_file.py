@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from .camera import Camera
-from .checks import Faults, Table, shown
-from .errors import SceneError, did_you_mean
+from .checks import Faults, Table
+from .errors import SceneError, did_you_mean, shown
 from .lights import Spotlight
 from .motion import CameraMotion, KeyframedSpotlight, LissajousMotion, ModelMotion, SpotlightMotion
 from .scene import RenderDefaults

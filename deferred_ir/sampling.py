@@ -52,7 +52,8 @@ def _stratified(count: int, rng: np.random.Generator) -> Array:
     tops = np.cumsum(heights) - heights
     u = (column + rng.random(count)) / per_row[row]
     v = tops[row] + heights[row] * rng.random(count)
-    return np.minimum(np.stack([u, v], axis=1), np.nextafter(1, 0))
+    points: Array = np.minimum(np.stack([u, v], axis=1), np.nextafter(1, 0))
+    return points
 
 
 def disc(square: Array) -> Array:

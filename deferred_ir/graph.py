@@ -98,7 +98,10 @@ class Pass:
         self.params = self.Params() if params is None else params
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """What it writes, a pure function of its parameters and its inputs' descriptions (None: not connected)."""
+        """What it writes, a pure function of its parameters and its inputs' descriptions (None: not connected).
+
+        Raises GraphError for what does not fit together; `compile` adds the pass's name.
+        """
         raise NotImplementedError
 
     def unneeded(self, facts: Facts) -> str | None:
@@ -162,27 +165,21 @@ def compile(graph: Graph, outputs: Sequence[str], facts: Facts = Facts()) -> Pla
     """
     faults: list[str] = []
     roots, edges = _resolve(graph, outputs, faults)
-    _raise(graph, faults)
     unneeded = _leave_out(graph, edges, facts)
     for name, (source, _) in roots.items():
         if source in unneeded:
             faults.append(f"output '{name}' comes from {source}, which is left out: {unneeded[source]}")
     reached = _reach(roots, edges, unneeded)
-    order = _order(edges, reached, faults)
-    _raise(graph, faults)
-    steps = _describe(graph, edges, order, faults)
-    _raise(graph, faults)
+    steps = _describe(graph, edges, _order(edges, reached, faults), faults)
+    if faults:
+        told = " ".join("; ".join(faults).split())  # a name may hold a line break
+        raise GraphError(f"{graph.origin}: {told}")
     left_out = {name: unneeded.get(name, "no requested output needs it") for name in graph.nodes if name not in reached}
     return Plan(steps, roots, left_out, _lifetimes(steps, roots))
 
 
 Edges = dict[str, dict[str, tuple[str, str] | None]]
 Roots = dict[str, tuple[str, str]]
-
-
-def _raise(graph: Graph, faults: list[str]) -> None:
-    if faults:
-        raise GraphError(f"{graph.origin}: " + "; ".join(faults))
 
 
 def _resolve(graph: Graph, outputs: Sequence[str], faults: list[str]) -> tuple[Roots, Edges]:
@@ -251,15 +248,14 @@ def _reach(roots: Roots, edges: Edges, unneeded: Mapping[str, str]) -> set[str]:
 
 def _order(edges: Edges, reached: set[str], faults: list[str]) -> list[str]:
     """Writers before readers; the same file always gives the same order."""
-    sorter: TopologicalSorter[str] = TopologicalSorter()
-    for name, ports in edges.items():
-        if name in reached:
-            sorter.add(name, *(source[0] for source in ports.values() if source))
-    try:
-        return list(sorter.static_order())
-    except CycleError as error:
-        faults.append("cycle: " + " -> ".join(error.args[1]) + "; remove one of these inputs")
-        return []
+    ahead = {name: [source[0] for source in edges[name].values() if source] for name in edges if name in reached}
+    while True:
+        try:
+            return list(TopologicalSorter(ahead).static_order())
+        except CycleError as error:
+            cycle = error.args[1]
+            faults.append("cycle: " + " -> ".join(cycle) + "; remove one of these inputs")
+            ahead = {name: sources for name, sources in ahead.items() if name not in cycle}
 
 
 def _describe(graph: Graph, edges: Edges, order: list[str], faults: list[str]) -> tuple[Step, ...]:
@@ -268,21 +264,25 @@ def _describe(graph: Graph, edges: Edges, order: list[str], faults: list[str]) -
     for name in order:
         work, descriptions = graph.nodes[name].work, dict[str, Description | None]()
         wires = {port: source for port, source in edges[name].items() if source}
-        if any(source not in steps for source, _ in wires.values()):
-            continue  # its writer is at fault; what it would read is unknown
-        found_faults = len(faults)
+        required = {port for port, declared in work.inputs.items() if not declared.optional}
         for port, (source, written) in wires.items():
+            if source not in steps:
+                continue  # at fault already; what it would write is unknown
             outputs = steps[source].outputs
             if written not in outputs:
                 faults.append(f"{name}.{port}: {source} has no output '{written}'{did_you_mean(written, outputs)}")
                 continue
-            descriptions[port] = found = outputs[written].description
-            wanted = work.inputs[port].format
-            if wanted not in (None, found.format):
+            found, wanted = outputs[written].description, work.inputs[port].format
+            if wanted in (None, found.format):
+                descriptions[port] = found
+            else:
                 faults.append(f"{name}.{port} wants {wanted}, but {source}.{written} is {found.format}")
-        if len(faults) == found_faults:
+        if descriptions.keys() >= wires.keys() | required:
             described = dict.fromkeys(work.inputs) | descriptions
-            steps[name] = Step(name, work, edges[name], work.outputs(described), described)
+            try:
+                steps[name] = Step(name, work, edges[name], work.outputs(described), described)
+            except GraphError as error:
+                faults.append(f"{name}: {error}")
     for name, text in graph.outputs.items():
         source_name, _, port = text.partition(".")
         if source_name in steps and port not in steps[source_name].outputs:

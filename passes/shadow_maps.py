@@ -50,7 +50,7 @@ class ShadowMaps(Pass):
         if layers > allowed:
             fits = max(allowed - 1, 0) * per_layer
             raise GraphError(
-                f"shadow_maps: maps for {vpls} VPLs of {self.params.vpl_size}x{self.params.vpl_size} need "
+                f"maps for {vpls} VPLs of {self.params.vpl_size}x{self.params.vpl_size} need "
                 f"{layers * 4 * edge * edge // 2**20} MiB, and shadow_maps.budget is {self.params.budget}; "
                 f"{fits} VPLs fit; use fewer, a smaller shadow_maps.vpl_size or a larger budget"
             )

@@ -12,10 +12,10 @@ vec4 light_clip(Light light, vec3 position) {
 // xy: NDC in the light's map; z: depth to compare. The point is lifted off its face by `offset` texels of a map of `size`
 // texels, because a texel holds one depth for all of its footprint; no world units are involved.
 vec3 shadow_lookup(Light light, vec3 position, vec3 normal, float size, float offset) {
-    float texel = 2.0 * light.tan_half / size * dot(position - light.position, light.z_axis);
-    vec3 d = position + normal * (offset * texel) - light.position;
+    vec3 from = position - light.position;
+    vec3 d = from + normal * (2.0 * offset / size * light.tan_half * dot(light.z_axis, from));
     float w = max(dot(d, light.z_axis), frame.near);  // behind the near plane nothing was drawn, and cosines are 0
-    return vec3(dot(d, light.x_axis) / w, dot(d, light.y_axis) / w, frame.near / w);
+    return vec3(dot(d, light.x_axis), dot(d, light.y_axis), frame.near) / w;
 }
 
 // Map coordinates in [0, 1], kept half a texel inside, so that a 2x2 comparison never leaves the map or tile.

@@ -9,6 +9,7 @@ import copy
 import hashlib
 import importlib
 import json
+import os
 import pkgutil
 import tomllib
 from collections.abc import Mapping
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from . import params
-from .errors import GraphError, did_you_mean
+from .errors import GraphError, did_you_mean, shown
 from .graph import Graph, Node, Pass
 
 PASSES = "deferred_ir.passes"
@@ -51,7 +52,8 @@ def load_graph(
         faults.append('outputs: none; add a table [outputs] with radiance = "pass.port"')
     faults += [f"{key}: no such key{did_you_mean(key, KEYS)}" for key in table if key not in KEYS]
     if faults:
-        raise GraphError(f"{path.name}: " + "; ".join(faults))
+        told = " ".join("; ".join(faults).split())  # a key may hold a line break
+        raise GraphError(f"{path.name}: {told}")
     return Graph(nodes, outputs, path.name)
 
 
@@ -79,7 +81,7 @@ def _find(name: str, beside: Path | None) -> Path:
     if name in graph_names():
         return _graphs_folder() / f"{name}.toml"
     path = Path(name) if beside is None else beside / name
-    if path.is_file():
+    if os.path.isfile(path):  # unlike Path.is_file it does not raise for names that the system cannot have
         return path
     if path.suffix == ".toml":
         raise GraphError(f"{name}: no such graph file; built-in graphs: {', '.join(graph_names())}")
@@ -94,10 +96,10 @@ def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
         )
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except tomllib.TOMLDecodeError as error:
-        raise GraphError(f"{path.name}: not TOML: {error}") from error
     except (OSError, UnicodeDecodeError) as error:
         raise GraphError(f"{path.name}: cannot be read: {error}") from error
+    except (ValueError, RecursionError) as error:  # bad TOML, or too long or too deeply nested for Python
+        raise GraphError(f"{path.name}: not TOML: {error}") from error
     if not isinstance(table.get("passes", {}), dict):
         raise GraphError(f"{path.name}: passes: wants a table [passes.NAME] for each pass")
     if "extends" not in table:
@@ -140,6 +142,9 @@ def _node(name: str, table: Any, passes: Mapping[str, type[Pass]], faults: list[
         faults.append(f"passes.{name}: wants a table of parameters and inputs")
         return None
     kind, inputs = table.get("type", name), table.get("inputs", {})
+    if not isinstance(kind, str):
+        faults.append(f"passes.{name}.type: is {shown(kind)}, but wants the name of a pass type in quotes")
+        return None
     if not isinstance(inputs, dict) or not all(isinstance(source, str) for source in inputs.values()):
         faults.append(f'passes.{name}.inputs: wants {{ port = "pass.port" }}')
         return None
@@ -148,7 +153,7 @@ def _node(name: str, table: Any, passes: Mapping[str, type[Pass]], faults: list[
     elif kind in pass_types():
         work = importlib.import_module(f"{PASSES}.{kind}").PASS
     else:
-        faults.append(f"passes.{name}: no pass type '{kind}'{did_you_mean(str(kind), [*pass_types(), *passes])}")
+        faults.append(f"passes.{name}: no pass type '{kind}'{did_you_mean(kind, [*pass_types(), *passes])}")
         return None
     values = {key: value for key, value in table.items() if key not in RESERVED}
     return Node(name, work(params.parse(work.Params, values, name, faults)), inputs)

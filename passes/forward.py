@@ -35,8 +35,8 @@ class Forward(Pass):
         "lights": Input("the spotlight, then the VPLs", format="light"),
         "primitives": Input("face that shows, plus one", format="r32ui"),
         "depth": Input("depth of that face", format="depth32f", attach=True),
-        "spot": Input("the spotlight's map", format="depth32f"),
-        "vpls": Input("the VPLs' maps", format="depth32f"),
+        "spot": Input("the spotlight's map", format="depth32f", optional=True),
+        "vpls": Input("the VPLs' maps", format="depth32f", optional=True),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
@@ -54,15 +54,16 @@ class Forward(Pass):
         defines = {"UNIT_MAPS": FIRST_MAP, "LIGHTS_PER_DRAW": group, **frame.buffers.defines}
         compare = io.gpu.sampler(linear=True, compare=">=")
         lights.bind_uniform(1, 0)
-        io["spot"][0].bind(FIRST_MAP, compare)
+        if io["spot"]:
+            io["spot"][0].bind(FIRST_MAP, compare)
         frame.buffers.draw(io.program("forward.frag", "scene.vert", defines={"SPOT": 1, **defines}))
         program = io.program("forward.frag", "scene.vert", defines={"SPOT": 0, **defines})
         number = 1  # of the light; a group must not straddle two blocks
         while number < len(lights.records):
             block, first = divmod(number, LIGHTS_PER_BLOCK)
             count = min(group, len(lights.records) - number, LIGHTS_PER_BLOCK - first)
-            for i in range(count):
-                io["vpls"][number - 1 + i].bind(FIRST_MAP + i, compare)
+            for i, shadows in enumerate((io["vpls"] or [])[number - 1 : number - 1 + count]):
+                shadows.bind(FIRST_MAP + i, compare)
             lights.bind_uniform(1, block)
             program.set(first=first, count=count)
             frame.buffers.draw(program)

@@ -4,11 +4,13 @@
 #include "lib/shadow.glsl"
 
 layout(binding = UNIT_PRIMITIVES) uniform usampler2D primitives;
-#if SPOT
+#if SPOT && HAS_SPOT
 layout(binding = UNIT_MAPS) uniform sampler2DShadow spot;
-#else
+#elif !SPOT && HAS_VPLS
 layout(binding = UNIT_MAPS) uniform sampler2DShadow vpls[LIGHTS_PER_DRAW];
-uniform int first;  // light of this block that vpls[0] belongs to
+#endif
+#if !SPOT
+uniform int first;  // of this draw, in this block
 uniform int count;  // lights of this draw
 #endif
 
@@ -24,13 +26,18 @@ void main() {
     Surface s = surface();
     vec3 irradiance = vec3(0.0);
 #if SPOT
-    irradiance = spot_irradiance(lights[0], s.position, s.normal, s.shading_normal)
-               * visibility(spot, lights[0], SPOT_SIZE, SPOT_OFFSET, s);
+    irradiance = spot_irradiance(lights[0], s.position, s.normal, s.shading_normal);
+#if HAS_SPOT
+    irradiance *= visibility(spot, lights[0], SPOT_SIZE, SPOT_OFFSET, s);
+#endif
 #else
     for (int i = 0; i < LIGHTS_PER_DRAW; ++i) {
         if (i >= count) break;
-        irradiance += vpl_irradiance(lights[first + i], s.position, s.normal, s.shading_normal)
-                    * visibility(vpls[i], lights[first + i], VPL_SIZE, VPL_OFFSET, s);
+        vec3 arriving = vpl_irradiance(lights[first + i], s.position, s.normal, s.shading_normal);
+#if HAS_VPLS
+        arriving *= visibility(vpls[i], lights[first + i], VPL_SIZE, VPL_OFFSET, s);
+#endif
+        irradiance += arriving;
     }
 #endif
     radiance = vec4(s.albedo * irradiance * INVERSE_PI, 1.0);

@@ -6,12 +6,16 @@ import signal
 import subprocess
 import sys
 import time
+from statistics import median
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from deferred_ir.cli import main
+from deferred_ir.loading import load
+from deferred_ir.renderer import Renderer
+from deferred_ir.timing import Record
 
 SMALL = ("--size", "32x32", "--vpls", "4", "--device", "software")
 SCENE = """
@@ -117,12 +121,18 @@ def test_run_json_holds_what_the_contract_promises(tmp_path):
     assert all(len(run[key]) == 16 for key in ("scene_hash", "graph_hash"))
 
 
-def test_the_passes_times_add_up_to_the_frame(tmp_path):
-    file = tmp_path / "run.json"
-    size = ("--size", "256x256", "--vpls", "64", "--device", "software")
-    assert main(["render", "cornell", *size, "--frames", "5", "--json", str(file)]) == 0
-    run = json.loads(file.read_text())
-    assert sum(entry["gpu_ms"] for entry in run["passes"]) == pytest.approx(run["frame_ms"], rel=0.1)
+def test_the_passes_times_add_up_to_the_frame():
+    scene, record = load("cornell"), Record()
+    with Renderer((256, 256), device="software") as renderer:
+        plan = renderer.plan(scene, 64)
+        renderer.draw(scene, plan)
+        for _ in range(9):
+            renderer.draw(scene, plan, record=record)
+        renderer.finish(record)
+    sums = [sum(gpu for gpu, _ in laps.values()) for laps in record.laps]
+    shares = [total / frame for total, frame in zip(sums, record.frame_ms, strict=True)]
+    assert median(shares) == pytest.approx(1, abs=0.1)
+    assert list(record.laps[0]) == [step.name for step in plan.steps]
 
 
 def test_only_the_asked_outputs_are_made(tmp_path):

@@ -25,6 +25,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "DeleteTextures": (None, _I, _P),
     "DepthMask": (None, ctypes.c_ubyte),
     "DrawBuffers": (None, _I, _P),
+    "Flush": (None,),
     "FramebufferTexture": (None, _U, _U, _U, _I),
     "GenFramebuffers": (None, _I, _P),
     "GenQueries": (None, _I, _P),

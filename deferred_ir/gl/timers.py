@@ -39,6 +39,10 @@ class Timers:
         marks = self._frames[-1]
         query = self._free.pop() if self._free else self.gpu.gl.make("GenQueries")
         self.gpu.gl.QueryCounter(query, raw.TIMESTAMP)
+        if not marks.queries:
+            # Drivers take a timestamp with the work that follows it: without this the first lap, which may be a pass
+            # on the CPU, would begin where the second does.
+            self.gpu.gl.Flush()
         marks.labels.append(label)
         marks.queries.append(query)
         marks.cpu.append(time.perf_counter())

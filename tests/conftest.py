@@ -11,12 +11,6 @@ from deferred_ir.gl.gpu import Gpu
 from deferred_ir.renderer import Renderer
 
 
-def clean(gpu: Gpu) -> None:
-    """An error left over by anyone would be raised by whoever looks next."""
-    with gpu.ctx:
-        assert gpu.ctx.error == "GL_NO_ERROR"
-
-
 @pytest.fixture(scope="session")
 def software_gpu() -> Iterator[Gpu]:
     gpu = Gpu("software")
@@ -28,10 +22,10 @@ def software_gpu() -> Iterator[Gpu]:
 def gpu(software_gpu: Gpu) -> Iterator[Gpu]:
     """The software device, current; OpenGL has no error before and after the test."""
     with software_gpu.ctx:
-        clean(software_gpu)
         software_gpu.reset()
+        assert software_gpu.ctx.error == "GL_NO_ERROR"
         yield software_gpu
-        clean(software_gpu)
+        assert software_gpu.ctx.error == "GL_NO_ERROR"
 
 
 @pytest.fixture
@@ -39,13 +33,17 @@ def renderer() -> Iterator[Callable[..., Renderer]]:
     """Makes Renderers on the software device; all are without OpenGL errors before and after the test."""
     made: list[Renderer] = []
 
+    def clean(one: Renderer) -> None:
+        with one.gpu.ctx:
+            assert one.gpu.ctx.error == "GL_NO_ERROR"
+
     def make(*arguments: Any, **options: Any) -> Renderer:
         options.setdefault("device", "software")
         made.append(Renderer(*arguments, **options))
-        clean(made[-1].gpu)
+        clean(made[-1])
         return made[-1]
 
     yield make
     for one in made:
-        clean(one.gpu)
+        clean(one)
         one.close()

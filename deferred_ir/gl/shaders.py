@@ -16,9 +16,14 @@ from ..errors import ShaderError, did_you_mean
 from .gpu import Gpu
 
 VERSION = "#version 430 core"
+_SUFFIXES = {".vert", ".geom", ".frag", ".comp", ".glsl"}
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 _MESSAGE = re.compile(r"^(?:ERROR: )?\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*(.*)$", re.MULTILINE)  # Mesa, NVIDIA, AMD, Intel
-_SAMPLERS = {0x8B5E, 0x8B62, 0x8DC1, 0x8DC4, 0x8DD2}  # GL_SAMPLER_2D, _2D_SHADOW, _2D_ARRAY, _2D_ARRAY_SHADOW, UINT
+# Every GL_*SAMPLER_*: float, shadow, rectangle and buffer, array, signed, unsigned, cube array, multisampled.
+_SAMPLERS = {
+    *(*range(0x8B5D, 0x8B65), *range(0x8DC0, 0x8DC6), *range(0x8DC9, 0x8DD9)),
+    *(*range(0x900C, 0x9010), *range(0x9108, 0x910E)),
+}
 
 
 @dataclass(frozen=True)
@@ -45,7 +50,7 @@ def flatten(name: str, folders: Iterable[Path], defines: Mapping[str, int | floa
         seen.add(file)
         path = next((folder / file for folder in search if (folder / file).is_file()), None)
         if path is None:
-            known = [str(p.relative_to(f).as_posix()) for f in search for p in f.rglob("*.*") if p.suffix != ".py"]
+            known = [p.relative_to(f).as_posix() for f in search for p in f.rglob("*.*") if p.suffix in _SUFFIXES]
             raise ShaderError(f"{included_by}: no shader file '{file}'{did_you_mean(file, known)}")
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
             include = _INCLUDE.match(line)
@@ -152,9 +157,9 @@ class ShaderLibrary:
 
 
 def _locate(message: str, sources: Mapping[str, Source], name: str) -> str:
-    """The driver's first complaint in one line, with the file and line it is about."""
+    """The driver's first error in one line, with the file and line it is about."""
     stage = next((stage for stage in sources if f"\n{stage}\n" in message), None)
-    found = _MESSAGE.findall(message)
+    found = [(line, text) for line, text in _MESSAGE.findall(message) if not text.startswith("warning")]
     if stage is None or not found:
         text = [line for line in message.splitlines() if line.strip() and set(line) != {"="}]
         return f"{name}: {' '.join(text[2:] or text)}"

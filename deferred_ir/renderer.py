@@ -89,7 +89,7 @@ class Renderer:
             self._upload(scene)
             assert self._buffers
             start = clock.perf_counter()
-            frame = Frame(self.size, scene.at(time), self._buffers, self._trace, seed, time)
+            frame = Frame(self.size, scene.at(time), self._buffers, self.tracer, seed, time)
             timers = self._timers if record else None
             if timers:
                 timers.begin()
@@ -138,7 +138,8 @@ class Renderer:
         self._buffers = SceneBuffers(self.gpu, scene)
         self._geometry, self._scene = scene.geometry, scene
 
-    def _trace(self) -> Tracer:
+    def tracer(self) -> Tracer:
+        """Embree over the scene drawn last, built when first asked for."""
         if self._tracer is None:
             self._tracer = Tracer(self._scene)
         return self._tracer

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from . import bias
 from .config import graph_hash
 from .graph import Graph, Plan
 from .image import write_whole
@@ -43,8 +44,18 @@ def run_record(
         "passes": passes,
         "maps_drawn": [counters.get("maps_drawn", 0) for counters in record.counters],
         "left_out": [{"what": name, "why": why, "ms": None, "bytes": None} for name, why in plan.left_out.items()],
+        "bias": _bias(renderer, scene, graph),
         "memory_bytes": renderer.memory(),
     }
+
+
+def _bias(renderer: Renderer, scene: Scene, graph: Graph) -> dict[str, float] | None:
+    """Indirect light lost by design, None where no VPLs were asked for or the camera sees no indirect light."""
+    casting = graph.nodes.get("vpl")
+    if casting is None or casting.work.params.count == 0 or not scene.facts.emits:
+        return None
+    p = casting.work.params
+    return bias.estimate(scene, renderer.tracer(), clamp=p.clamp, fov=p.fov)
 
 
 def write(path: Path, data: dict[str, Any]) -> None:

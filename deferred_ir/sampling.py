@@ -6,6 +6,7 @@ and Halton).
 
 from __future__ import annotations
 
+import logging
 from functools import lru_cache
 from typing import Literal, get_args
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from .typing import Array
 
+log = logging.getLogger("deferred_ir")
 Pattern = Literal["random", "stratified", "halton", "sobol"]
 PATTERNS: tuple[str, ...] = get_args(Pattern)
 
@@ -25,6 +27,15 @@ def unit_square(pattern: Pattern, count: int, seed: int) -> Array:
     return points
 
 
+def warn_unbalanced(pattern: Pattern, count: int) -> None:
+    """Say that `count` points of a Sobol set are not balanced, unless it is a power of two."""
+    if pattern == "sobol" and count & (count - 1):
+        whole = 1 << count.bit_length()
+        log.warning(
+            "sobol: %d points are not balanced, only powers of two are; take %d or %d", count, whole // 2, whole
+        )
+
+
 def _points(pattern: Pattern, count: int, seed: int) -> Array:
     rng = np.random.default_rng(seed)
     if count == 0 or pattern == "random":
@@ -35,8 +46,7 @@ def _points(pattern: Pattern, count: int, seed: int) -> Array:
 
     if pattern == "halton":
         return np.asarray(qmc.Halton(2, rng=rng).random(count))
-    # A Sobol set of 2^m points is balanced; of another count, its first points are taken. Asking for all 2^m keeps
-    # SciPy from warning about what `count` says already.
+    # All 2^m points: SciPy would warn about other counts, and warn_unbalanced has done so once.
     points: Array = qmc.Sobol(2, rng=rng).random_base2(int(np.ceil(np.log2(count))))[:count]
     return points
 

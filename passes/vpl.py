@@ -12,7 +12,7 @@ from deferred_ir.graph import Buffer, Description, Output, Pass
 from deferred_ir.io import Io
 from deferred_ir.lights import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, light_records
 from deferred_ir.params import param
-from deferred_ir.sampling import Pattern
+from deferred_ir.sampling import Pattern, warn_unbalanced
 from deferred_ir.vpls import NONE, cast
 
 
@@ -22,6 +22,7 @@ class Params:
 
     count: int = param(64, lo=0, hi=65536, doc="Rays that leave the spotlight; each that lands makes a VPL.")
     pattern: Pattern = param("sobol", doc="Sample pattern on the disc of directions.")
+    bounces: int = param(1, lo=1, hi=64, doc="Diffuse bounces; each beyond the first adds VPLs.")
     fov: float = param(150.0, lo=1.0, hi=179.9, doc="Full opening angle of the cone a VPL shines into, degrees.")
     clamp: float = param(
         0.02, lo=0.0, hi=10.0, doc="Distance below which 1/d^2 is held, as a fraction of the scene's diagonal."
@@ -33,17 +34,21 @@ class Vpl(Pass):
 
     Params = Params
 
+    def __init__(self, params: Params | None = None) -> None:
+        super().__init__(params)
+        warn_unbalanced(self.params.pattern, self.params.count)
+
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """One buffer with room for all rays."""
+        """One buffer with room for the spotlight and a VPL for each ray of each bounce."""
         del inputs
-        records = Buffer("light", 1 + self.params.count, LIGHT.itemsize, LIGHTS_PER_BLOCK)
+        records = Buffer("light", 1 + self.params.count * self.params.bounces, LIGHT.itemsize, LIGHTS_PER_BLOCK)
         return {"lights": Output("the spotlight, then the VPLs", records, {"LIGHTS_PER_BLOCK": LIGHTS_PER_BLOCK})}
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Cast, pack, upload."""
         light, p = frame.scene.spotlight, self.params
         shines = p.count > 0 and any(light.emission)
-        vpls = cast(light, frame.tracer(), p.count, p.pattern, frame.seed) if shines else NONE
+        vpls = cast(light, frame.tracer(), p.count, p.pattern, frame.seed, bounces=p.bounces) if shines else NONE
         spot = light_records(
             np.array([light.position]), light.axis[None], np.array([light.emission]), fov=light.fov, tile=SPOT_TILE
         )

@@ -1,0 +1,68 @@
+"""How much indirect light a VPL image loses by design: to the clamp on 1/d^2 and to the cone of vpl.fov.
+
+Estimated, not guessed: cosine-distributed rays from what the camera sees find the light that one bounce brings; a share
+of it arrives from nearer than the clamp distance c, which VPLs give only d^2/c^2 of, and a share leaves its surface
+outside the cone (Kollig and Keller 2004 call the first the bounded part's residual).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .lights import one_minus_cos
+from .scene import Scene
+from .tracing import Hits, Tracer
+from .typing import Array
+from .vpls import LUMINANCE, lift_to_hemisphere
+
+GRID = 128
+RAYS = 8
+
+
+def estimate(scene: Scene, tracer: Tracer, *, clamp: float, fov: float, seed: int = 0) -> dict[str, float] | None:
+    """Relative indirect light lost to `clamp` (fraction of the diagonal) and to the cone `fov` (degrees), both <= 0.
+
+    Of the first bounce, over the image, by luminance. None where the camera sees no indirect light.
+    """
+    rng = np.random.default_rng(seed)
+    directions = scene.camera.rays((GRID, GRID)).reshape(-1, 3)
+    seen = tracer.closest(np.broadcast_to(np.asarray(scene.camera.position, float), directions.shape), directions)
+    seen_at = np.repeat(np.flatnonzero(seen.hit), RAYS)
+    origins = tracer.lift(seen.position[seen_at], seen.normal[seen_at])
+    # A ray each in RAYS slices of the angle, the radius at random: the disc's area, evenly.
+    radius, angle = (
+        np.sqrt(rng.random(len(seen_at))),
+        (np.arange(len(seen_at)) % RAYS + rng.random(len(seen_at))) / RAYS,
+    )
+    points = np.stack([radius * np.cos(2 * np.pi * angle), radius * np.sin(2 * np.pi * angle)], axis=1)
+    away = lift_to_hemisphere(points, seen.shading_normal[seen_at])
+    hits = tracer.closest(origins, away)
+    weight = (_reflected(scene, tracer, hits) * seen.albedo[seen_at]) @ LUMINANCE
+    weight[(away * seen.normal[seen_at]).sum(axis=1) <= 0] = 0  # into its own face: nothing arrives
+    total = weight.sum()
+    if total <= 0:
+        return None
+    distance = np.linalg.norm(hits.position - origins, axis=1)
+    c = clamp * scene.geometry.diagonal
+    kept = np.minimum(1, (distance / c) ** 2) if c > 0 else np.ones(len(distance))
+    outside = -(away * hits.normal).sum(axis=1) < 1 - one_minus_cos(fov)
+    return {
+        "clamp": round(float((weight * (kept - 1)).sum() / total), 5),
+        "wide_light": round(float(-weight[outside].sum() / total), 5),
+    }
+
+
+def _reflected(scene: Scene, tracer: Tracer, hits: Hits) -> Array:
+    """Directly lit radiance of surfaces (n, 3); 0 where the ray met none."""
+    light = scene.spotlight
+    position = np.asarray(light.position, float)
+    to = position - hits.position
+    square = np.maximum((to**2).sum(axis=1), np.finfo(float).tiny)
+    towards = to / np.sqrt(square)[:, None]
+    facing = hits.hit & ((towards * hits.normal).sum(axis=1) > 0)
+    cosine = np.maximum((towards * hits.shading_normal).sum(axis=1), 0) * facing
+    strength = np.maximum(-towards @ light.axis, 0) * light.cone(-towards) * cosine / square
+    lit = np.flatnonzero(strength)
+    starts = tracer.lift(hits.position[lit], hits.normal[lit])
+    strength[lit[tracer.occluded(starts, np.broadcast_to(position, starts.shape))]] = 0
+    return hits.albedo * np.multiply.outer(strength / np.pi, np.asarray(light.emission, float))

@@ -27,7 +27,8 @@ class Camera:
 
     def axes(self) -> Array:
         """Rows: right, up and forward, orthonormal, float64 (3, 3)."""
-        view = glm.lookAt(glm.dvec3(self.position), glm.dvec3(self.look_at), glm.dvec3(self.up))
+        # Three numbers each: given one tuple, PyGLM reads it in single precision.
+        view = glm.lookAt(glm.dvec3(*self.position), glm.dvec3(*self.look_at), glm.dvec3(*self.up))
         rows = np.array(view, dtype=np.float64)[:3, :3]  # GLM's rows of the view matrix: right, up, backward
         axes: Array = rows * np.array([[1.0], [1.0], [-1.0]])
         return axes

@@ -1,0 +1,105 @@
+"""Error against the clamp distance, for several numbers of VPLs: what the default of vpl.clamp rests on.
+
+    python -m deferred_ir.profiling.clamp -o out/clamp cornell colors atrium --fov 150
+
+VPLs with ray-cast visibility (so that no shadow map has a part in it) against a path-traced reference, relMSE trimmed,
+mean over seeds. Writes clamp.json and clamp.svg; needs the extra `report`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from deferred_ir import vpl_reference
+from deferred_ir.image import write_whole
+from deferred_ir.loading import load
+from deferred_ir.metrics import relmse
+from deferred_ir.path_tracer import PathTracer
+from deferred_ir.scene import Scene
+from deferred_ir.tracing import Tracer
+from deferred_ir.vpls import cast
+
+SIZE = (96, 96)
+CLAMPS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1)
+COUNTS = (64, 256, 1024)
+SEEDS = 4
+SPP = 1024
+
+
+def measure(scene: Scene, fov: float) -> dict[str, list[float]]:
+    """relMSE of each number of VPLs: a list over CLAMPS."""
+    tracer = Tracer(scene)
+    judge = PathTracer(scene, tracer)
+    truth = judge.estimate(SIZE, SPP)
+    seen, reference = judge.seen(SIZE), truth.direct + truth.indirect
+    errors = {str(count): [0.0] * len(CLAMPS) for count in COUNTS}
+    with tqdm(total=len(COUNTS) * SEEDS * len(CLAMPS), desc=scene.name, disable=None) as bar:
+        for count in COUNTS:
+            for seed in range(SEEDS):
+                vpls = cast(scene.spotlight, tracer, count, "sobol", seed)
+                for i, clamp in enumerate(CLAMPS):
+                    indirect = vpl_reference.indirect(tracer, seen, vpls, fov=fov, clamp=clamp)
+                    image = truth.direct + indirect.reshape(reference.shape)
+                    errors[str(count)][i] += relmse(image, reference, truth.hit)[0] / SEEDS
+                    bar.update()
+    return errors
+
+
+def plot(results: dict[str, Any], path: Path) -> None:
+    """A log-log panel for each scene."""
+    import matplotlib as mpl
+
+    mpl.use("svg")
+    mpl.rcParams["svg.hashsalt"] = "clamp"  # the same figures give the same file
+    import matplotlib.pyplot as plt
+
+    figure, panels = plt.subplots(1, len(results), figsize=(4.2 * len(results), 3.8), squeeze=False)
+    for panel, (name, errors) in zip(panels[0], results.items(), strict=True):
+        for count, line in errors.items():
+            panel.loglog(CLAMPS, line, "o-", ms=3, label=f"{count} VPLs")
+        panel.axvline(0.02, color="grey", lw=0.8, ls=":")
+        panel.set_title(name)
+        panel.set_xlabel("clamp distance / diagonal")
+        panel.grid(alpha=0.3)
+        panel.legend(fontsize=8)
+    panels[0][0].set_ylabel("relMSE")
+    figure.tight_layout()
+    write_whole(path, lambda part: figure.savefig(part, format="svg", metadata={"Date": None}))
+
+
+def table(results: dict[str, Any]) -> str:
+    """relMSE as a Markdown table."""
+    rows = ["| scene | VPLs | " + " | ".join(map(str, CLAMPS)) + " |", "|---" * (len(CLAMPS) + 2) + "|"]
+    for name, errors in results.items():
+        for count, line in errors.items():
+            rows.append(f"| {name} | {count} | " + " | ".join(f"{value:.4f}" for value in line) + " |")
+    return "\n".join(rows)
+
+
+def main() -> None:
+    """Measure, write, print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("scenes", nargs="+", metavar="SCENE")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--fov", type=float, default=150.0, help="of the VPLs' cones, degrees")
+    arguments = parser.parse_args()
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    results = {(scene := load(name)).name: measure(scene, arguments.fov) for name in arguments.scenes}
+    text = json.dumps({"clamps": CLAMPS, "fov": arguments.fov, "seeds": SEEDS, "size": SIZE, "relmse": results}, indent=1)
+
+    def fill(part: Path) -> None:
+        part.write_text(text + "\n", encoding="utf-8")
+
+    write_whole(arguments.output / "clamp.json", fill)
+    plot(results, arguments.output / "clamp.svg")
+    print(table(results))
+
+
+if __name__ == "__main__":
+    main()

@@ -62,7 +62,8 @@ def cast(
     for bounce in range(1, bounces):
         last = made[-1]
         power = last.emission @ LUMINANCE
-        rays = round(count * power.sum() / left) if left > 0 else 0
+        # Smooth normals can bend the light up; buffers have room for `count` a bounce.
+        rays = min(count, round(count * power.sum() / left)) if left > 0 else 0
         if rays == 0:
             break
         rng = np.random.default_rng([seed, bounce])

@@ -10,7 +10,7 @@ import os
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -45,6 +45,10 @@ class Hits:
     def hit(self) -> Bools:
         """Which rays met a surface, bool (n,)."""
         return self.face >= 0
+
+    def rows(self, chosen: Ints) -> Hits:
+        """The hits of the rays `chosen`, indices (m,)."""
+        return Hits(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
 class Tracer:
@@ -91,18 +95,18 @@ class Tracer:
     def _hits(self, face: Ints, weights: Array, directions: Array) -> Hits:
         geometry = self.scene.geometry
         hit = face >= 0
-        corners, weights = geometry.faces[face[hit]], weights[hit][..., None]
+        corners, weights = geometry.faces[face[hit]], weights[hit]
         position, normal, shading, albedo = (np.zeros((len(face), 3)) for _ in range(4))
-        position[hit] = (geometry.positions[corners] * weights).sum(axis=1)
+        position[hit] = blended(geometry.positions, corners, weights)
         facing = turned(geometry.face_normals[face[hit]], -directions[hit])
         smooth = facing.copy()
         if geometry.normals is not None:
-            blend = (geometry.normals[corners].astype(np.float64) * weights).sum(axis=1)
-            length = np.linalg.norm(blend, axis=1)
+            blend = blended(geometry.normals, corners, weights)
+            length = np.sqrt(np.einsum("ij,ij->i", blend, blend))
             has = length > 1e-6
             smooth[has] = turned(blend[has] / length[has, None], facing[has])
         normal[hit], shading[hit] = facing, smooth
-        albedo[hit] = materials.albedo(self.scene, face[hit], weights[..., 0])
+        albedo[hit] = materials.albedo(self.scene, face[hit], weights)
         return Hits(face, position, normal, shading, albedo)
 
     def occluded(self, origins: Array, targets: Array) -> Bools:
@@ -124,7 +128,14 @@ class Tracer:
         return lifted
 
 
+def blended(values: Array, corners: Ints, weights: Array) -> Array:
+    """The rows of `values` (v, 3) at `corners` (n, 3), weighted by `weights` (n, 3) and added up, float64 (n, 3)."""
+    a, b, c = (values[corners[:, i]] * weights[:, i, None] for i in range(3))
+    total: Array = a + b + c
+    return total
+
+
 def turned(normals: Array, towards: Array) -> Array:
     """`normals` (n, 3), flipped where they point away from `towards` (n, 3)."""
-    away = (normals * towards).sum(axis=-1, keepdims=True) < 0
-    return np.where(away, -normals, normals)
+    away = np.einsum("ij,ij->i", normals, towards) < 0
+    return np.where(away[:, None], -normals, normals)

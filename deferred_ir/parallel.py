@@ -1,0 +1,37 @@
+"""Work on threads with the results in order, so that sums over them do not depend on the number of threads."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+AHEAD = 4
+"""Tasks begun for each thread before their results are taken: enough to keep all busy, with few results in memory."""
+
+
+def in_order(
+    function: Callable[[Task], Result], tasks: Iterable[Task], threads: int | None = None
+) -> Generator[Result, None, None]:
+    """`function` of each task, one after the other; on `threads` threads, None for as many as the machine has.
+
+    Close it (contextlib.closing) where the loop over it may end early: what has not begun is then dropped.
+    """
+    threads = threads or os.cpu_count() or 1
+    waiting: deque[Future[Result]] = deque()
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            for task in tasks:
+                waiting.append(pool.submit(function, task))
+                if len(waiting) > AHEAD * threads:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import DeviceError
 from ..graph import Texture
+from ..materials import srgb_table
 from ..scene import Scene
 from .gpu import Gpu
 from .resources import GpuTexture
@@ -58,9 +59,12 @@ class SceneBuffers:
                 f"{texture.name}: {width}x{height} pixels, and this driver takes at most {self.gpu.max_size}; "
                 "scale the image down"
             )
-        result = GpuTexture(self.gpu, Texture("srgb8", (width, height)), (width, height))
-        alpha = np.full((height, width, 1), 255, np.uint8)
-        result.upload(np.concatenate([texture.pixels, alpha], axis=2)[::-1])
+        # Decoded here, into half floats: drivers may approximate sRGB (llvmpipe is 2 % off in dark texels), and rays
+        # must fetch what the rasteriser shows.
+        linear = np.ones((height, width, 4), np.float32)
+        linear[..., :3] = srgb_table().astype(np.float16)[texture.pixels]
+        result = GpuTexture(self.gpu, Texture("rgba16f", (width, height)), (width, height))
+        result.upload(linear[::-1])
         return result
 
     def bind(self) -> None:

@@ -13,7 +13,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from tqdm import tqdm
 
 from deferred_ir import vpl_reference
@@ -91,7 +90,9 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
     results = {(scene := load(name)).name: measure(scene, arguments.fov) for name in arguments.scenes}
-    text = json.dumps({"clamps": CLAMPS, "fov": arguments.fov, "seeds": SEEDS, "size": SIZE, "relmse": results}, indent=1)
+    text = json.dumps(
+        {"clamps": CLAMPS, "fov": arguments.fov, "seeds": SEEDS, "size": SIZE, "relmse": results}, indent=1
+    )
 
     def fill(part: Path) -> None:
         part.write_text(text + "\n", encoding="utf-8")

@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from statistics import median, quantiles
 from typing import Any
 from unittest import mock
@@ -27,6 +27,12 @@ from deferred_ir.scene_file import parse_size
 from deferred_ir.timing import Record
 
 GRAPHS = ("deferred", "forward")
+CALLS = {
+    moderngl.VertexArray: ("render",),
+    moderngl.Buffer: ("write",),
+    moderngl.Context: ("finish", "enable", "disable", "enable_direct", "disable_direct", "__enter__", "__exit__"),
+}
+"""Methods of moderngl that can wait for the driver."""
 
 
 def side_by_side(scene: Scene, vpls: int, size: tuple[int, int], frames: int) -> dict[str, Record]:
@@ -65,14 +71,11 @@ def stopwatch() -> Iterator[list[float]]:
         return call
 
     find = raw.GL.__getattr__
-    with (
-        mock.patch.object(moderngl.VertexArray, "render", timed(moderngl.VertexArray.render)),
-        mock.patch.object(moderngl.Buffer, "write", timed(moderngl.Buffer.write)),
-        mock.patch.object(moderngl.Context, "finish", timed(moderngl.Context.finish)),
-        mock.patch.object(moderngl.Context, "__enter__", timed(moderngl.Context.__enter__)),
-        mock.patch.object(moderngl.Context, "__exit__", timed(moderngl.Context.__exit__)),
-        mock.patch.object(raw.GL, "__getattr__", lambda gl, name: timed(find(gl, name))),
-    ):
+    with ExitStack() as patches:
+        for kind, names in CALLS.items():
+            for name in names:
+                patches.enter_context(mock.patch.object(kind, name, timed(getattr(kind, name))))
+        patches.enter_context(mock.patch.object(raw.GL, "__getattr__", lambda gl, name: timed(find(gl, name))))
         yield spent
 
 
@@ -82,10 +85,10 @@ def python_time(scene: Scene, vpls: int, size: tuple[int, int], frames: int) -> 
     with stopwatch() as spent, Renderer(size, "deferred") as renderer:
         plan = renderer.plan(scene, vpls, ["radiance"])
         renderer.draw(scene, plan)
-        for seed in range(frames):
+        for _ in range(frames):
             before = spent[0] + renderer.embree_seconds
             start = time.perf_counter()
-            renderer.draw(scene, plan, seed=0 * seed)
+            renderer.draw(scene, plan)
             wall = time.perf_counter() - start
             times.append((wall - (spent[0] + renderer.embree_seconds - before)) * 1e3)
     return times

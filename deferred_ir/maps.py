@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from .errors import GraphError
 from .params import param
 
 
@@ -21,6 +22,16 @@ class MapParams:
     cull: Literal["none", "front"] = param(
         "none", doc="front: draw back faces only, which moves the bias to the dark side; for closed meshes."
     )
+    budget: int = param(1280, lo=1, hi=65536, doc="Most memory that the maps may take, MiB.")
+
+    def check_budget(self, vpls: int, nbytes: int, fits: int) -> None:
+        """Raise GraphError if maps for `vpls` VPLs, `nbytes` in all, go beyond the budget; `fits` VPLs would not."""
+        if nbytes > self.budget * 2**20:
+            raise GraphError(
+                f"maps for {vpls} VPLs of {self.vpl_size}x{self.vpl_size} need {nbytes // 2**20} MiB, and "
+                f"shadow_maps.budget is {self.budget}; {max(fits, 0)} VPLs fit; use fewer, a smaller "
+                "shadow_maps.vpl_size or a larger budget"
+            )
 
     def defines(self) -> dict[str, int | float]:
         """For the shaders of writer and readers."""
@@ -37,5 +48,6 @@ class MapParams:
         ctx.enable(ctx.DEPTH_TEST)
         ctx.depth_func = ">"
         if self.cull == "front":
+            # A map's axes are right, up and into the view, a left-handed frame: OpenGL sees front faces as back faces.
             ctx.enable(ctx.CULL_FACE)
-            ctx.cull_face = "front"
+            ctx.cull_face = "back"

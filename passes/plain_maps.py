@@ -25,6 +25,8 @@ class PlainMaps(Pass):
         """A texture for each light that the buffer can hold."""
         lights, p = inputs["lights"], self.params
         count = lights.records if isinstance(lights, Buffer) else 1
+        single, room = 4 * p.vpl_size**2, p.budget * 2**20 - 4 * p.spot_size**2
+        p.check_budget(count - 1, 4 * p.spot_size**2 + (count - 1) * single, room // single)
         spot = Texture("depth32f", size=(p.spot_size, p.spot_size), copies=1)
         vpls = Texture("depth32f", size=(p.vpl_size, p.vpl_size), copies=max(count - 1, 1))
         return {

@@ -8,30 +8,20 @@ block of lights: the vertex shader chooses layer and tile, four clip distances c
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from deferred_ir.errors import GraphError
 from deferred_ir.frame import Frame
 from deferred_ir.gl import raw
 from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.io import Io
 from deferred_ir.lights import LIGHTS_PER_BLOCK
 from deferred_ir.maps import MapParams
-from deferred_ir.params import param
-
-
-@dataclass(frozen=True)
-class Params(MapParams):
-    """Parameters of the atlas."""
-
-    budget: int = param(1280, lo=1, hi=65536, doc="Most memory that the atlas may take, MiB.")
 
 
 class ShadowMaps(Pass):
     """Depth as each light sees it."""
 
-    Params = Params
+    Params = MapParams
     inputs: ClassVar[Mapping[str, Input]] = {"lights": Input("the lights to draw maps for", format="light")}
 
     def _tiles_per_layer(self) -> int:
@@ -46,14 +36,8 @@ class ShadowMaps(Pass):
         """The atlas, as large as the lights need."""
         vpls, edge, per_layer = _lights(inputs) - 1, self._edge(), self._tiles_per_layer()
         layers = 1 + -(-vpls // per_layer)
-        allowed = self.params.budget * 2**20 // (4 * edge * edge)
-        if layers > allowed:
-            fits = max(allowed - 1, 0) * per_layer
-            raise GraphError(
-                f"maps for {vpls} VPLs of {self.params.vpl_size}x{self.params.vpl_size} need "
-                f"{layers * 4 * edge * edge // 2**20} MiB, and shadow_maps.budget is {self.params.budget}; "
-                f"{fits} VPLs fit; use fewer, a smaller shadow_maps.vpl_size or a larger budget"
-            )
+        layer = 4 * edge * edge
+        self.params.check_budget(vpls, layers * layer, (self.params.budget * 2**20 // layer - 1) * per_layer)
         defines = {**self.params.defines(), "ATLAS_SIZE": edge}
         atlas = Texture("depth32f", size=(edge, edge), layers=layers)
         return {"atlas": Output("reversed depth; layer 0 the spotlight's, then tiles of VPLs", atlas, defines)}

@@ -6,8 +6,13 @@
 
 uniform int first;  // light of this block that instance 0 draws
 in vec3 position;
+#if LAYER_FROM_VERTEX
 out float gl_ClipDistance[4];
-#if !LAYER_FROM_VERTEX
+#else
+out gl_PerVertex {  // as the geometry shader reads it
+    vec4 gl_Position;
+    float gl_ClipDistance[4];
+};
 flat out int layer;
 #endif
 

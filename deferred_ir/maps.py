@@ -13,7 +13,7 @@ from .params import param
 class MapParams:
     """Parameters of shadow maps."""
 
-    spot_size: int = param(1024, lo=16, hi=16384, doc="Width and height of the spotlight's map, texels.")
+    spot_size: int = param(2048, lo=16, hi=16384, doc="Width and height of the spotlight's map, texels.")
     vpl_size: int = param(256, lo=16, hi=4096, doc="Width and height of a VPL's map, texels.")
     spot_offset: float = param(
         1.0, lo=0.0, hi=16.0, doc="How far a point is lifted off its face before the spotlight's map is asked, texels."

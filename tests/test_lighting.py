@@ -161,7 +161,7 @@ def test_an_occluder_shades_the_spotlight_where_it_should(renderer, graph):
     scene = shadow_scene()
     bare = build(plane(2.0, albedo=ALBEDO), camera=scene.camera, spotlight=scene.spotlight)
     one = renderer(SIZE, graph)
-    texel = 2 * 1.5 * np.tan(np.radians(40)) / 1024
+    texel = 2 * 1.5 * np.tan(np.radians(40)) / 2048
     check_shadow(scene, one.render(scene, vpls=0).radiance, one.render(bare, vpls=0).radiance, texel)
 
 

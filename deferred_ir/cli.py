@@ -64,6 +64,23 @@ def _parser() -> Parser:
     render.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
     render.add_argument("--json", metavar="RUN.json", help="write what was rendered, and how long it took")
 
+    reference = command("reference", _reference, "Trace a reference image with rays: OUT.npy, and OUT.json beside it.")
+    reference.add_argument("scene", metavar="SCENE", help="a built-in scene, a scene file (.toml) or a model")
+    reference.add_argument("-o", "--output", required=True, metavar="OUT.npy", help="float32 linear radiance")
+    reference.add_argument("--size", metavar="WxH", help="pixels (default: 512x512)")
+    kind = reference.add_mutually_exclusive_group()
+    kind.add_argument("--spp", type=_positive, metavar="N", help="trace N paths a pixel (default: 64)")
+    kind.add_argument("--vpls", type=_positive, metavar="N", help="instead: N VPLs with perfect visibility")
+    reference.add_argument("--bounces", type=_count, metavar="N", help="of indirect light (default: 1)")
+    reference.add_argument("--seed", type=_count, default=0, metavar="N", help="of the samples (default: 0)")
+    reference.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="vpl.PARAM=VALUE",
+        help="vpl.fov, vpl.clamp or vpl.pattern as in a render; may be repeated",
+    )
+
     graph = command("graph", _graph, "Show what a render graph runs, in what order, and what it leaves out.")
     graph.add_argument("graph", metavar="NAME|FILE", help="a built-in graph or a graph file")
     graph.add_argument("--scene", metavar="SCENE", help="plan for this scene")
@@ -109,6 +126,12 @@ def _render(arguments: argparse.Namespace) -> int:
     from .render_command import render
 
     return render(arguments, settings(arguments.set))
+
+
+def _reference(arguments: argparse.Namespace) -> int:
+    from .reference_command import reference
+
+    return reference(arguments, settings(arguments.set))
 
 
 def _graph(arguments: argparse.Namespace) -> int:

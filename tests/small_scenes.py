@@ -87,6 +87,13 @@ def room(albedo: tuple[float, float, float] = GREY) -> Scene:
     )
 
 
+def crooked_room() -> Scene:
+    """`room` with its corners out of place: no wall is parallel to another, so depths never tie along a whole wall."""
+    scene = room()
+    off = np.random.default_rng(8).uniform(-0.12, 0.12, scene.geometry.positions.shape)
+    return replace(scene, geometry=replace(scene.geometry, positions=scene.geometry.positions + off))
+
+
 def textured(scene: Scene, pixels: Any, uvs: Any) -> Scene:
     """`scene`, whose last material gets an image texture; uvs: (V, 2) of all vertices."""
     geometry = replace(scene.geometry, uvs=np.asarray(uvs, "f4"))

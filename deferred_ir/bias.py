@@ -65,4 +65,5 @@ def _reflected(scene: Scene, tracer: Tracer, hits: Hits) -> Array:
     lit = np.flatnonzero(strength)
     starts = tracer.lift(hits.position[lit], hits.normal[lit])
     strength[lit[tracer.occluded(starts, np.broadcast_to(position, starts.shape))]] = 0
-    return hits.albedo * np.multiply.outer(strength / np.pi, np.asarray(light.emission, float))
+    radiance: Array = hits.albedo * np.multiply.outer(strength / np.pi, np.asarray(light.emission, float))
+    return radiance

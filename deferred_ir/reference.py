@@ -93,9 +93,9 @@ def reference(
     settings = settings or {}
     _check(size, settings, spp=spp, vpls=vpls, bounces=bounces, seed=seed)
     start = time.perf_counter()
+    tell: dict[str, Any] = {"scene": scene.name, "scene_hash": scene.hash, "size": list(size), "bounces": bounces}
     scene = scene.at(0.0)
     paths = PathTracer(scene, Tracer(scene), bounces)
-    tell: dict[str, Any] = {"scene": scene.name, "scene_hash": scene.hash, "size": list(size), "bounces": bounces}
     if vpls is None:
         spp = DEFAULT_SPP if spp is None else spp
         made = _by_paths(paths, size, spp, seed=seed, threads=threads, progress=progress)
@@ -104,6 +104,7 @@ def reference(
         params = vpl_params({**settings, "vpl.count": vpls, "vpl.bounces": max(bounces, 1)})
         made = _by_vpls(paths, size, params, seed=seed, threads=threads, progress=progress)
         tell |= {"vpls": vpls, "seed": seed, "settings": {name: getattr(params, name[4:]) for name in SETTINGS}}
+    tell["hit_fraction"] = float(made.hit.mean())
     return replace(made, meta={**tell, **made.meta, "seconds": round(time.perf_counter() - start, 3)})
 
 

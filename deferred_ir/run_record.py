@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import bias
 from .config import graph_hash
 from .graph import Graph, Plan
 from .image import write_whole
-from .renderer import Renderer
 from .scene import Scene
 from .timing import Record
+
+if TYPE_CHECKING:
+    from .renderer import Renderer
 
 
 def run_record(

@@ -114,4 +114,5 @@ def _resample(power: Array, count: int, offset: float) -> Ints:
     """`count` indices, each drawn count * power / sum(power) times, rounded up or down (systematic resampling)."""
     ends = np.cumsum(power)
     ticks = (np.arange(count) + offset) / count * ends[-1]
-    return np.minimum(np.searchsorted(ends, ticks, side="right"), len(power) - 1)
+    drawn: Ints = np.minimum(np.searchsorted(ends, ticks, side="right"), len(power) - 1)
+    return drawn

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,7 @@ class Vpl(Pass):
 
     Params = Params
 
-    def __init__(self, params: Params | None = None) -> None:
+    def __init__(self, params: Any = None) -> None:
         super().__init__(params)
         warn_unbalanced(self.params.pattern, self.params.count)
 

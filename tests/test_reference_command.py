@@ -25,6 +25,7 @@ def test_the_command_writes_the_image_and_its_record(kind, tmp_path, capsys):
     assert len(record["scene_hash"]) == 16
     assert (record["size"], record["bounces"], record["seed"]) == ([24, 16], 1, 5)
     assert record["seconds"] > 0
+    assert 0 < record["hit_fraction"] <= 1
     if kind == "paths":
         assert (record["spp"], record["settings"]) == (64, {})
         assert 0 < record["standard_error"] < 1

@@ -29,31 +29,37 @@ class Image:
         """Write `.png` (display pixels), `.npy` or `.exr` (float32 radiance); the file appears whole or not at all."""
         path = Path(path)
         check_path(path)
-        write = {".png": self._png, ".npy": self._npy, ".exr": self._exr}[path.suffix.lower()]
-        write_whole(path, write)
+        suffix = path.suffix.lower()
+        name = "display" if suffix == ".png" else "radiance"
+        pixels = getattr(self, name)
+        if pixels is None:
+            raise OutputError(
+                f"{path}: this graph has no output '{name}', which {suffix} files hold; save another kind"
+            )
+        write = {".png": _png, ".npy": _npy, ".exr": _exr}[suffix]
+        write_whole(path, lambda part: write(part, pixels))
 
-    def _png(self, path: Path) -> None:
-        import PIL.Image
 
-        if self.display is None:
-            raise OutputError(f"{path.name}: this graph has no output 'display' to write as PNG; save .npy or .exr")
-        PIL.Image.fromarray(self.display).save(path, format="PNG")
+def _png(path: Path, pixels: Any) -> None:
+    import PIL.Image
 
-    def _linear(self, path: Path) -> Any:
-        if self.radiance is None:
-            raise OutputError(f"{path.name}: this graph has no output 'radiance' to write; save .png")
-        return self.radiance
+    PIL.Image.fromarray(pixels).save(path, format="PNG")
 
-    def _npy(self, path: Path) -> None:
-        with path.open("wb") as file:
-            np.save(file, self._linear(path))
 
-    def _exr(self, path: Path) -> None:
-        import OpenEXR
+def _npy(path: Path, pixels: Array) -> None:
+    with path.open("wb") as file:
+        np.save(file, pixels)
 
-        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-        with OpenEXR.File(header, {"RGB": np.ascontiguousarray(self._linear(path), np.float32)}) as file:
+
+def _exr(path: Path, pixels: Array) -> None:
+    import OpenEXR
+
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    try:
+        with OpenEXR.File(header, {"RGB": np.ascontiguousarray(pixels, np.float32)}) as file:
             file.write(str(path))
+    except RuntimeError as error:  # its word for a fault of the system's
+        raise OSError(str(error)) from error
 
 
 def check_path(path: str | os.PathLike[str]) -> None:

@@ -46,12 +46,12 @@ def _png(path: Path, pixels: Any) -> None:
     PIL.Image.fromarray(pixels).save(path, format="PNG")
 
 
-def _npy(path: Path, pixels: Array) -> None:
+def _npy(path: Path, pixels: Any) -> None:
     with path.open("wb") as file:
         np.save(file, pixels)
 
 
-def _exr(path: Path, pixels: Array) -> None:
+def _exr(path: Path, pixels: Any) -> None:
     import OpenEXR
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}

@@ -9,7 +9,7 @@ PIP    := $(BIN)/python -m pip install -qq --no-input --disable-pip-version-chec
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint types clean
+.PHONY: help demo test lint types pictures clean
 
 help:  ## this list
 	@echo "deferred-ir: global illumination on OpenGL"
@@ -24,6 +24,9 @@ demo: $(VENV)/installed  ## install, render the Cornell box to out/cornell.png
 test: lint types  ## install, check style and types, run all tests
 	@$(BIN)/python tools/system.py opengl
 	@$(BIN)/python -m pytest
+
+pictures: $(VENV)/installed  ## render the pictures of the README again
+	@for scene in cornell atrium colors; do $(BIN)/deferred-ir render $$scene --vpls 256 -o docs/pictures/$$scene.png; done
 
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check --quiet .

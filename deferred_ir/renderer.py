@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -19,7 +20,7 @@ from .gl.scene_buffers import SceneBuffers
 from .gl.timers import Timers
 from .graph import Graph, Pass, Plan, compile
 from .image import Image
-from .scene import Geometry, Scene
+from .scene import Scene
 from .timing import Record
 from .tracing import Tracer
 
@@ -44,9 +45,9 @@ class Renderer:
         set: Mapping[str, Any] | None = None,
         passes: Mapping[str, type[Pass]] | None = None,
     ) -> None:
-        if len(size) != 2 or not all(isinstance(n, int) and n > 0 for n in size):
+        if not isinstance(size, Sequence) or len(size) != 2 or not all(isinstance(n, Integral) and n > 0 for n in size):
             raise SettingError(f"size {size!r}: wants two whole numbers above 0, width and height")
-        self.size = size
+        self.size = int(size[0]), int(size[1])
         self._graph_name, self._set, self._passes = graph, dict(set or {}), dict(passes or {})
         self._graphs: dict[int | None, Graph] = {}
         self._plans: dict[Any, Plan] = {}
@@ -59,7 +60,7 @@ class Renderer:
         self._timers = Timers(self.gpu)
         self._buffers: SceneBuffers | None = None
         self._tracer: Tracer | None = None
-        self._geometry: Geometry | None = None
+        self._scene: Scene | None = None
 
     def graph(self, vpls: int | None) -> Graph:
         """The graph with this number of VPLs, None for its own."""
@@ -85,6 +86,8 @@ class Renderer:
 
     def draw(self, scene: Scene, plan: Plan, *, seed: int = 0, time: float = 0.0, record: Record | None = None) -> None:
         """Draw one whole frame and wait for it; what it took is added to `record`."""
+        if not isinstance(seed, Integral) or seed < 0:
+            raise SettingError(f"seed {seed!r}: wants a whole number of 0 or more")
         with self.gpu.ctx:
             self._upload(scene)
             assert self._buffers
@@ -131,16 +134,17 @@ class Renderer:
         return self._tracer.seconds if self._tracer else 0.0
 
     def _upload(self, scene: Scene) -> None:
-        """Put the geometry on the device unless it is there; the same one may come with a new camera or light."""
-        if scene.geometry is self._geometry:
+        """Put the scene on the device unless it is there; the same surfaces may come with a new camera or light."""
+        surfaces = ("geometry", "materials", "textures")
+        if self._scene and all(getattr(scene, part) is getattr(self._scene, part) for part in surfaces):
             return
         self._forget()
-        self._buffers = SceneBuffers(self.gpu, scene)
-        self._geometry, self._scene = scene.geometry, scene
+        self._buffers, self._scene = SceneBuffers(self.gpu, scene), scene
 
     def tracer(self) -> Tracer:
         """Embree over the scene drawn last, built when first asked for."""
         if self._tracer is None:
+            assert self._scene, "no scene was drawn yet"
             self._tracer = Tracer(self._scene)
         return self._tracer
 
@@ -148,7 +152,7 @@ class Renderer:
         if self._buffers:
             self.executor.library.forget(self._buffers)
             self._buffers.release()
-        self._buffers = self._tracer = self._geometry = None
+        self._buffers = self._tracer = self._scene = None
 
     def close(self) -> None:
         """Give the context and all in it back."""

@@ -57,6 +57,7 @@ class Gpu:
 
     def close(self) -> None:
         """Destroy the context and all that lives in it."""
-        for sampler in self._samplers.values():
-            sampler.release()
+        with self.ctx:  # names mean something else in whichever context is current
+            for sampler in self._samplers.values():
+                sampler.release()
         devices.close(self.ctx, self._loader)

@@ -112,7 +112,8 @@ class Tracer:
     def occluded(self, origins: Array, targets: Array) -> Bools:
         """Whether anything lies strictly between points (n, 3) and (n, 3), bool (n,).
 
-        Both ends stop short by a ten-thousandth of the way; a point on a surface also needs its offset (see `lift`).
+        The far end stops short by a ten-thousandth of the way, so targets may lie on surfaces; an origin on a surface
+        needs its offset (see `lift`).
         """
         org, way = origins.astype(np.float32), (targets - origins).astype(np.float32)
         reach = np.full(len(org), 1 - 1e-4, np.float32)

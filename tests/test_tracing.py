@@ -146,6 +146,14 @@ def test_a_thin_wall_close_to_the_target_still_occludes():
     assert not tracer.occluded(above, np.array([[0.0, -0.00005, 0.0]])).any()  # a ten-thousandth of the way
 
 
+def test_an_origin_on_a_surface_needs_its_lift():
+    tracer = Tracer(build(plane()))
+    on_plane, above = np.array([[0.1, 0.0, 0.2]]), np.array([[0.3, 1.0, 0.1]])
+    assert tracer.occluded(on_plane, above).all()
+    assert not tracer.occluded(tracer.lift(on_plane, np.array([[0.0, 1, 0]])), above).any()
+    assert not tracer.occluded(above, on_plane).any()
+
+
 def test_occlusion_is_symmetric():
     tracer = Tracer(room())
     a, b = RNG.uniform(-0.9, 0.9, (2, 3000, 3))

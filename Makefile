@@ -25,8 +25,8 @@ test: lint types  ## install, check style and types, run all tests
 	@$(BIN)/python tools/system.py opengl
 	@$(BIN)/python -m pytest
 
-pictures: $(VENV)/installed  ## render the pictures of the README again
-	@for scene in cornell atrium colors; do $(BIN)/deferred-ir render $$scene --vpls 256 -o docs/pictures/$$scene.png; done
+pictures: $(VENV)/installed  ## render the pictures of README and docs again
+	@$(BIN)/python tools/pictures.py
 
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check --quiet .

@@ -151,6 +151,17 @@ def test_both_sides_of_a_face_show_and_are_turned_to_the_viewer(renderer):
         np.testing.assert_allclose(normals, np.broadcast_to((0, np.sign(height), 0), normals.shape), atol=1e-4)
 
 
+def test_a_shading_normal_is_turned_into_the_hemisphere_of_its_face(renderer):
+    """From a file whose normals point below the face, and seen from either side."""
+    slanted = replace(plane(), normals=np.tile((0.6, -0.8, 0.0), (4, 1)))
+    for height in (2.0, -2.0):
+        scene = build(slanted, camera=Camera((0, height, 0.5), (0, 0, 0)))
+        buffers = gbuffer(renderer, scene)
+        normals = decoded(buffers["normals"][buffers["depth"][..., 0] > 0][:, :2])
+        expected = np.multiply(np.sign(height), (-0.6, 0.8, 0))
+        np.testing.assert_allclose(normals, np.broadcast_to(expected, normals.shape), atol=1e-4)
+
+
 def test_the_nearest_of_two_surfaces_shows_whatever_their_order(renderer):
     near, far = plane(0.5, height=0.5, albedo=(1, 0, 0)), plane(1.0, albedo=(0, 1, 0))
     one, other = (gbuffer(renderer, build(*meshes)) for meshes in ((near, far), (far, near)))

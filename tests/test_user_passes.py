@@ -243,8 +243,7 @@ def test_state_of_one_pass_does_not_reach_the_next(draw, tmp_path):
 
     graph = GRAPH + '[passes.gbuffer]\n[passes.tonemap]\ninputs = { radiance = "lighting.radiance" }\n'
     one, _ = draw(graph=graph, kind=Messy)
-    one.draw(room(), one.plan(room(), 4))
-    image = one.read(one.plan(room(), 4))
-    expected = draw()[0].render(room(), vpls=4)
+    image = one.render(room(), vpls=4, seed=9)  # another image, or what the first frame left would do
+    expected = draw()[0].render(room(), vpls=4, seed=9)
     np.testing.assert_array_equal(image.radiance, expected.radiance)
     np.testing.assert_array_equal(image.display, expected.display)

@@ -1,4 +1,4 @@
-"""Images of many lights: how they add up, that order, seeds and units of length do what they should, and none at all."""
+"""Images of many lights: how they add up; that order, seeds and units of length do what they should; none at all."""
 
 from __future__ import annotations
 

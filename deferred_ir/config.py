@@ -113,7 +113,7 @@ def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
             known = base.get("passes", {})
             raise GraphError(f"{path.name}: passes.{name}: nothing to remove{did_you_mean(name, known)}")
         del base["passes"][name], table["passes"][name]
-    return _overlay(base, {key: value for key, value in table.items() if key != "extends"})
+    return _cut(_overlay(base, {key: value for key, value in table.items() if key != "extends"}))
 
 
 def _overlay(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
@@ -123,6 +123,17 @@ def _overlay(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
         both = isinstance(value, dict) and isinstance(result.get(key), dict)
         result[key] = _overlay(result[key], value) if both else copy.deepcopy(value)
     return result
+
+
+def _cut(table: dict[str, Any]) -> dict[str, Any]:
+    """`table` without the inputs and outputs that an extending file has set to false."""
+    wirings = [table.get("outputs")]
+    wirings += [entry.get("inputs") for entry in table.get("passes", {}).values() if isinstance(entry, dict)]
+    for wires in wirings:
+        if isinstance(wires, dict):
+            for port in [port for port, source in wires.items() if source is False]:
+                del wires[port]
+    return table
 
 
 def _apply(tables: dict[str, Any], settings: Mapping[str, Any], faults: list[str]) -> None:

@@ -18,7 +18,7 @@ from .gl import devices
 
 DISTRIBUTION = "deferred-ir"
 OPTIONAL_FEATURES = {
-    "GL_ARB_clip_control": "without it: conventional depth, less exact far from the camera",
+    "GL_ARB_clip_control": "without it: fragment shaders write the depth, slower but as exact",
     "GL_ARB_shader_viewport_layer_array": "without it: a geometry shader picks the layer, slower",
 }
 VARIABLES = {

@@ -280,9 +280,13 @@ def _describe(graph: Graph, edges: Edges, order: list[str], faults: list[str]) -
         if descriptions.keys() >= wires.keys() | required:
             described = dict.fromkeys(work.inputs) | descriptions
             try:
-                steps[name] = Step(name, work, edges[name], work.outputs(described), described)
+                step = Step(name, work, edges[name], work.outputs(described), described)
             except GraphError as error:
                 faults.append(f"{name}: {error}")
+                continue
+            steps[name] = step
+            both = sorted(step.outputs.keys() & work.inputs.keys())
+            faults.extend(f"{name}.{port}: is an input and an output; rename one of them" for port in both)
     for name, text in graph.outputs.items():
         source_name, _, port = text.partition(".")
         if source_name in steps and port not in steps[source_name].outputs:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from . import config
-from .errors import SettingError
+from .errors import GraphError, SettingError
 from .executor import Executor
 from .frame import Frame
 from .gl.gpu import Gpu
@@ -23,6 +23,9 @@ from .image import Image
 from .scene import Scene
 from .timing import Record
 from .tracing import Tracer
+
+IMAGES = {"radiance": ("rgba32f", "rgba16f"), "display": ("rgba8",)}
+"""Formats of the outputs that become images."""
 
 
 class Renderer:
@@ -75,7 +78,9 @@ class Renderer:
         wanted = tuple(graph.outputs if outputs is None else outputs)
         key = (vpls, known, wanted)
         if key not in self._plans:
-            self._plans[key] = compile(graph, wanted, known)
+            plan = compile(graph, wanted, known)
+            _check_images(graph, plan)
+            self._plans[key] = plan
         return self._plans[key]
 
     def render(self, scene: Scene, *, vpls: int | None = None, seed: int = 0, time: float = 0.0) -> Image:
@@ -169,3 +174,14 @@ class Renderer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _check_images(graph: Graph, plan: Plan) -> None:
+    """Raise GraphError if an output that becomes an image is of another kind."""
+    steps = {step.name: step for step in plan.steps}
+    for name, (source, port) in plan.outputs.items():
+        found = steps[source].outputs[port].description.format
+        if name in IMAGES and found not in IMAGES[name]:
+            raise GraphError(
+                f"{graph.origin}: outputs.{name}: wants {' or '.join(IMAGES[name])}, but {source}.{port} is {found}"
+            )

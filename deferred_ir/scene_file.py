@@ -1,4 +1,4 @@
-"""Reads the TOML scene file into plain checked values; docs/conventions.md and README.md say what the keys mean.
+"""Reads the TOML scene file into plain checked values; docs/scene-file.md says what the keys mean.
 
 Nothing of the file is run, and no model is opened here.
 """

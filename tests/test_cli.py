@@ -258,6 +258,13 @@ def test_a_cycle_in_a_graph_is_named(tmp_path, capsys):
     assert "again" in line
 
 
+def test_an_output_that_is_no_image_is_told(tmp_path, capsys):
+    file = tmp_path / "odd.toml"
+    file.write_text('extends = "deferred"\n[outputs]\ndisplay = "gbuffer.albedo"\n')
+    line = fault(capsys, tmp_path, "render", "cornell", *SMALL, "--graph", str(file), "-o", str(tmp_path / "o.png"))
+    assert "outputs.display: wants rgba8, but gbuffer.albedo is rgba16f" in line
+
+
 def test_graph_shows_order_and_what_was_left_out(capsys, box):
     assert main(["graph", "deferred", "--scene", box(("emission = [1, 1, 1]", "emission = [0, 0, 0]"))]) == 0
     output = capsys.readouterr().out

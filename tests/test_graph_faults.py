@@ -31,6 +31,11 @@ def test_an_input_of_a_pass_without_any():
     assert faults(graph(light=(Fake(), {"depth": "light.out"}))) == "light: no input 'depth'"
 
 
+def test_a_port_that_is_input_and_output():
+    broken = graph(depth=source(), light=(Fake(reads("out")), {"out": "depth.out"}))
+    assert faults(broken) == "light.out: is an input and an output; rename one of them"
+
+
 def test_a_required_input_that_is_not_connected():
     broken = graph(light=(Fake(reads("depth")), {}))
     assert faults(broken) == 'light.depth: not connected; add inputs = { depth = "pass.port" }'

@@ -254,3 +254,13 @@ def test_a_light_on_a_surface_and_a_camera_on_the_light_give_finite_numbers(rend
     there = replace(scene, spotlight=spot)
     image = lit_by(renderer, tmp_path, np.concatenate([spot_record(there), lights]), SIZE, graph).render(there)
     assert np.isfinite(image.radiance).all()
+
+
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_a_light_exactly_where_a_pixel_looks_gives_nothing_instead_of_a_division_by_zero(renderer, tmp_path, graph):
+    scene = build(plane(), camera=Camera((0.0, 2.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)))
+    scene = replace(scene, spotlight=Spotlight((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), 120.0, (1.0, 1.0, 1.0)))
+    records = np.concatenate([spot_record(scene), vpl_records([(0, 0, 0)], [(0, 1, 0)], [(1, 1, 1)])])
+    for size in ((1, 1), (3, 3)):
+        image = lit_by(renderer, tmp_path, records, size, graph).render(scene)
+        assert (image.radiance == 0).all()

@@ -104,6 +104,14 @@ def test_programs_are_built_once(renderer):
     assert one.executor.library.compiled == built
 
 
+def test_a_scene_that_is_gone_leaves_no_vertex_arrays(renderer):
+    one = renderer(SIZE)
+    for scene in (room(), build(plane())):
+        one.render(scene, vpls=4)
+    drawn = {key for program in one.executor.library._programs.values() for key in program.arrays}
+    assert drawn == {None, one._buffers}
+
+
 def test_memory_is_given_back_with_the_plan(renderer):
     one = renderer(SIZE)
     one.render(room(), vpls=4)

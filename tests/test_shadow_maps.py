@@ -8,6 +8,7 @@ from fixed_lights import lit_by, spot_record, vpl_records
 from small_scenes import build, plane, quad, room
 
 from deferred_ir.errors import DeviceError, GraphError
+from deferred_ir.gl import raw
 from deferred_ir.lights import LIGHTS_PER_BLOCK, NEAR
 
 SIZE = (32, 32)
@@ -130,6 +131,13 @@ def test_culling_front_faces_draws_what_looks_away(renderer, tmp_path):
         atlas = atlas_of(renderer, tmp_path, scene, records, settings={**SETTINGS, "shadow_maps.cull": "front"})
         plain = plain_of(renderer, tmp_path, scene, records, {**SETTINGS, "shadow_maps.cull": "front"})
         assert (tile(atlas, 0, 32).max() > 0) == (plain[1][0].max() > 0) == drawn
+
+
+def test_clip_distances_are_off_for_whoever_draws_next(renderer):
+    one = renderer(SIZE)
+    one.render(room(), vpls=4)
+    with one.gpu.ctx:
+        assert [one.gpu.gl.integers(raw.CLIP_DISTANCE0 + side) for side in range(4)] == [[0]] * 4
 
 
 # The plan

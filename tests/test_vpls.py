@@ -58,9 +58,14 @@ def test_every_pattern_and_count_is_unbiased(pattern, count):
     np.testing.assert_allclose(np.mean(sums, axis=0), expected, rtol=0.05)
 
 
-def test_the_light_that_a_surface_gets_is_what_its_vpls_send_out_again():
-    """On part of the room, the floor, against the irradiance integrated over it: not just the sum is right."""
-    scene = build(plane(1.0, -1.0, albedo=(1, 1, 1)), box((-1, -1, -1), (1, 1.0, 1), (0, 0, 0)), spotlight=LIGHT)
+@pytest.mark.parametrize("normal", [(0.0, 1.0, 0.0), (0.48, 0.8, -0.36)])
+def test_the_light_that_a_surface_gets_is_what_its_vpls_send_out_again(normal):
+    """On part of the room, the floor, against the irradiance integrated over it: not just the sum is right.
+
+    Irradiance goes with the cosine at the shading normal, which leans in the second case.
+    """
+    floor = replace(plane(1.0, -1.0, albedo=(1, 1, 1)), normals=np.tile(normal, (4, 1)))
+    scene = build(floor, box((-1, -1, -1), (1, 1.0, 1), (0, 0, 0)), spotlight=LIGHT)
     keep = np.ones(len(scene.geometry.faces), bool)  # without the box's own floor
     keep[2:] = scene.geometry.positions[scene.geometry.faces[2:]][..., 1].max(axis=1) > -1
     geometry = replace(
@@ -73,7 +78,8 @@ def test_the_light_that_a_surface_gets_is_what_its_vpls_send_out_again():
     way = np.stack([x, np.full_like(x, -1.0), z], axis=-1) - np.array(LIGHT.position)
     distance = np.linalg.norm(way, axis=-1)
     towards = way / distance[..., None]
-    irradiance = np.maximum(towards @ LIGHT.axis, 0) * LIGHT.cone(towards) * -towards[..., 1] / distance**2
+    irradiance = np.maximum(towards @ LIGHT.axis, 0) * LIGHT.cone(towards) / distance**2
+    irradiance *= np.maximum(-towards @ np.array(normal), 0)
     power = irradiance.sum() * (2 / n) ** 2  # a diffuse white surface: radiance/pi * area, so emission is power/pi
     np.testing.assert_allclose(lights.emission.sum(axis=0), np.array(LIGHT.emission) * power / math.pi, rtol=2e-3)
 

@@ -64,6 +64,16 @@ def _parser() -> Parser:
     render.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
     render.add_argument("--json", metavar="RUN.json", help="write what was rendered, and how long it took")
 
+    compare = command("compare", _compare, "Measure how far an image is from its reference: relMSE, RMSE, bias, FLIP.")
+    compare.add_argument("image", metavar="A", help="linear image: .npy or .exr")
+    compare.add_argument(
+        "reference", metavar="B", help="the reference, likewise; its record is B.json, if there is one"
+    )
+    compare.add_argument("--json", metavar="F", help="write all figures")
+    compare.add_argument(
+        "--diff", metavar="OUT.png", help="write where the image is too dark (blue) or too bright (red)"
+    )
+
     reference = command("reference", _reference, "Trace a reference image with rays: OUT.npy, and OUT.json beside it.")
     reference.add_argument("scene", metavar="SCENE", help="a built-in scene, a scene file (.toml) or a model")
     reference.add_argument("-o", "--output", required=True, metavar="OUT.npy", help="float32 linear radiance")
@@ -126,6 +136,12 @@ def _render(arguments: argparse.Namespace) -> int:
     from .render_command import render
 
     return render(arguments, settings(arguments.set))
+
+
+def _compare(arguments: argparse.Namespace) -> int:
+    from .compare_command import run
+
+    return run(arguments)
 
 
 def _reference(arguments: argparse.Namespace) -> int:

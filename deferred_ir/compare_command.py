@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 from typing import Any
 
 from . import difference
-from .errors import OutputError, SettingError
+from .errors import OutputError, SettingError, shown
 from .image import check_folder
 from .image_reading import read_radiance, read_record, record_path
 from .metrics import Comparison, compare
@@ -61,18 +62,18 @@ def _check_outputs(image: Path, reference: Path, json: Path | None, diff: Path |
     """Before the work: what is written must be writable, and must not be what is read."""
     if diff and diff.suffix.lower() != ".png":
         raise OutputError(f"{diff}: the difference is a picture; name a .png")
-    inputs = {path.resolve() for given in (image, reference) for path in (given, record_path(given))}
+    inputs = {os.path.realpath(path) for given in (image, reference) for path in (given, record_path(given))}
     for output in (json, diff):
         if output is None:
             continue
         check_folder(output)
-        if output.resolve() in inputs:
+        if os.path.realpath(output) in inputs:
             raise OutputError(f"{output}: is an image that is compared, or its record; choose another name")
 
 
 def _same_scene(image: Path, ours: dict[str, Any], reference: Path, theirs: dict[str, Any]) -> None:
     if ours and theirs and ours["scene_hash"] != theirs["scene_hash"]:
-        names = [f"'{record.get('scene', '?')}' ({record['scene_hash']})" for record in (ours, theirs)]
+        names = [f"{shown(record.get('scene'))} ({shown(record['scene_hash'])})" for record in (ours, theirs)]
         raise SettingError(
             f"{image}: shows the scene {names[0]}, but {reference} shows {names[1]}; compare like with like"
         )

@@ -46,7 +46,7 @@ def save(path: Path, errors: Array) -> None:
     picture[height + 4 : height + 16, 8:-8] = false_colour(bar)
     canvas = Image.fromarray(picture)
     draw = ImageDraw.Draw(canvas)
-    for at, text in ((0.0, "-100 % darker"), (0.5, "0"), (1.0, "brighter +100 %")):
+    for at, text in ((0.0, "-100 %  darker"), (0.5, "0"), (1.0, "brighter  +100 %")):
         draw.text((8 + at * (wide - 16 - draw.textlength(text)), height + 18), text, fill=(0, 0, 0))
 
     def write(part: Path) -> None:

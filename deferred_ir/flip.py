@@ -50,14 +50,15 @@ class FlipParameters:
         """From the reference (H, W, 3) alone, by the rule of HDR-FLIP; use them for all images that are held to it.
 
         Only pixels above 0 make up the median: with a black background for median there would be no last exposure.
+        Of an even number it is the upper one, as flip-evaluator has it.
         """
         luminance = np.asarray(reference, np.float64) @ LUMINANCE
-        lit = luminance[luminance > 0]
+        lit = np.sort(luminance[luminance > 0])
         if lit.size == 0:
             raise SettingError("FLIP: the reference is black, there is no exposure that shows it")
         numerator, denominator = np.array(ACES)
         white = np.roots(numerator - BRIGHT * denominator).real.max()
-        start, stop = (float(math.log2(white / value)) for value in (lit.max(), np.median(lit)))
+        start, stop = (float(math.log2(white / value)) for value in (lit[-1], lit[lit.size // 2]))
         stop = min(stop, start + WIDEST)
         return cls(start, stop, max(2, math.ceil(stop - start)))
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,8 @@ def read_radiance(path: Path) -> Array:
         raise SettingError(f"{path}: is tone-mapped; compare linear radiance, .npy or .exr")
     if path.suffix.lower() not in SUFFIXES:
         raise SettingError(f"{path}: unknown kind of image '{path.suffix}'{did_you_mean(path.suffix, SUFFIXES)}")
-    if not path.is_file():
-        raise SettingError(f"{path}: is {'no file' if path.exists() else 'missing'}")
+    if not os.path.isfile(path):  # unlike Path.is_file it does not raise for names that the system cannot have
+        raise SettingError(f"{path}: is {'no file' if os.path.exists(path) else 'missing'}")
     return radiance(_npy(path) if path.suffix.lower() == ".npy" else _exr(path), str(path))
 
 
@@ -55,13 +56,17 @@ def _exr(path: Path) -> Any:
 
 @contextmanager
 def _muted() -> Iterator[None]:
-    """Without what OpenEXR's own code prints about a broken file: the error that it raises is told anyway."""
+    """Without what OpenEXR's own code prints about a broken file: the error that it raises is told anyway.
+
+    Its module prints through sys.stdout, the library below it straight to the process's streams.
+    """
     kept = {stream: os.dup(stream) for stream in (1, 2)}
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
         for stream in kept:
             os.dup2(nowhere, stream)
-        yield
+        with redirect_stdout(io.StringIO()):
+            yield
     finally:
         for stream, copy in kept.items():
             os.dup2(copy, stream)
@@ -81,7 +86,7 @@ def read_record(path: Path, size: tuple[int, int]) -> dict[str, Any]:
     the record has to state too, or the two do not belong together.
     """
     file = record_path(path)
-    if not file.exists():
+    if not os.path.exists(file):
         return {}
     try:
         record = json.loads(file.read_text(encoding="utf-8"))

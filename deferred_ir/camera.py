@@ -6,6 +6,7 @@ Pixel (0, 0) is the top left one of an image; its centre lies half a pixel insid
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,22 @@ from pyglm import glm
 
 from .motion import CameraMotion
 from .typing import Array, Vec3
+
+
+def view_fault(position: Vec3, look_at: Vec3, up: Vec3 | None = None) -> tuple[str, str] | None:
+    """The key at fault and why, where a view has no direction or `up` lies along it; None for a good view."""
+    view = np.subtract(look_at, position)
+    length = math.hypot(*view)
+    if length <= 1e-9 * max(map(abs, (*position, *look_at))):
+        return "look_at", "is the same point as the position; move one of them"
+    if up is None:
+        return None
+    up_length = math.hypot(*up)
+    if up_length == 0:
+        return "up", "must not be zero; [0, 1, 0] is the usual one"
+    if np.linalg.norm(np.cross(view / length, np.divide(up, up_length))) < 1e-6:
+        return "up", "up lies along the direction of view; turn it to the side"
+    return None
 
 
 @dataclass(frozen=True)

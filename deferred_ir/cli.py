@@ -153,19 +153,17 @@ def _reference(arguments: argparse.Namespace) -> int:
 def _graph(arguments: argparse.Namespace) -> int:
     from . import config, plan_text
     from .graph import Facts, compile
+    from .options import chosen_settings
+    from .scene import RenderDefaults
 
-    chosen, facts = settings(arguments.set), Facts()
+    defaults, facts = RenderDefaults(), Facts()
     if arguments.scene is not None:
         from .loading import load
 
         scene = load(arguments.scene)
         facts = scene.facts
-        chosen = {**scene.render.set, **chosen}
-        if scene.render.vpls is not None:
-            chosen.setdefault("vpl.count", scene.render.vpls)
-    if arguments.vpls is not None:
-        chosen["vpl.count"] = arguments.vpls
-    graph = config.load_graph(arguments.graph, chosen)
+        defaults = scene.render
+    graph = config.load_graph(arguments.graph, chosen_settings(defaults, settings(arguments.set), arguments.vpls))
     plan = compile(graph, list(graph.outputs), facts)
     print(plan_text.dot(graph, plan) if arguments.dot else plan_text.summary(plan))
     return 0

@@ -113,7 +113,14 @@ class Executor:
                 "use a smaller size"
             )
         if description.copies:
-            return [GpuTexture(self.gpu, description, width_height) for _ in range(description.copies)]
+            made: list[GpuTexture] = []
+            try:
+                for _ in range(description.copies):
+                    made.append(GpuTexture(self.gpu, description, width_height))
+            except DeviceError:
+                _release(made)  # the user is told to ask for less: room for that must be left
+                raise
+            return made
         return GpuTexture(self.gpu, description, width_height)
 
     def release(self) -> None:

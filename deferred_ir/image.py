@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import uuid
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from .errors import OutputError, did_you_mean
 
 SUFFIXES = (".png", ".npy", ".exr")
+LONGEST_NAME = 255
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,17 +75,19 @@ def check_path(path: str | os.PathLike[str]) -> None:
 def check_folder(path: Path) -> None:
     """Raise OutputError if no file can be written at `path`."""
     folder = path.parent
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike Path.is_dir it does not raise for names that the system cannot have
         raise OutputError(f"{path}: is a folder; name a file in it")
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise OutputError(f"{path}: there is no folder '{folder}'; create it first")
     if not os.access(folder, os.W_OK):
         raise OutputError(f"{path}: the folder '{folder}' is not writable; choose another")
+    if len(os.fsencode(path.name)) > LONGEST_NAME:
+        raise OutputError(f"{path.name[:40]}...: is too long for a file's name; {LONGEST_NAME} bytes are the most")
 
 
 def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     """Let `write` fill a file beside `path`, then put it in place at once."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part = path.with_name(f".{uuid.uuid4().hex}.part")
     try:
         write(part)
         os.replace(part, path)

@@ -27,6 +27,12 @@ class MapParams:
     def check_budget(self, vpls: int, nbytes: int, fits: int) -> None:
         """Raise GraphError if maps for `vpls` VPLs, `nbytes` in all, go beyond the budget; `fits` VPLs would not."""
         if nbytes > self.budget * 2**20:
+            if 4 * self.spot_size**2 > self.budget * 2**20:
+                raise GraphError(
+                    f"the spotlight's map of {self.spot_size}x{self.spot_size} alone needs "
+                    f"{4 * self.spot_size**2 // 2**20} MiB, and shadow_maps.budget is {self.budget}; use a smaller "
+                    "shadow_maps.spot_size or a larger budget"
+                )
             raise GraphError(
                 f"maps for {vpls} VPLs of {self.vpl_size}x{self.vpl_size} need {nbytes // 2**20} MiB, and "
                 f"shadow_maps.budget is {self.budget}; {max(fits, 0)} VPLs fit; use fewer, a smaller "

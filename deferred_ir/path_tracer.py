@@ -145,6 +145,8 @@ class PathTracer:
         at = surfaces.rows(paths // count)
         weight = at.albedo
         for bounce in range(self.bounces):
+            if len(paths) == 0:
+                break
             points = rng.random((len(paths), 2)) if bounce else _lattice(len(surfaces.face), count, rng)
             # A unit normal plus a point of the unit sphere is cosine-distributed, without a frame; its length is free.
             directions = at.shading_normal + _sphere(points)

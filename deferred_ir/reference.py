@@ -27,6 +27,7 @@ DISC_SAMPLES = 256
 """Points of a disc light for the direct light beside VPLs."""
 
 MOST_PIXELS = 1 << 24
+MOST_BOUNCES = 64
 SETTINGS = ("vpl.fov", "vpl.clamp", "vpl.pattern")
 """What `settings` may hold; all belong to VPLs. The number of bounces is an argument of its own."""
 
@@ -104,6 +105,9 @@ def reference(
         params = vpl_params({**settings, "vpl.count": vpls, "vpl.bounces": max(bounces, 1)})
         made = _by_vpls(paths, size, params, seed=seed, threads=threads, progress=progress)
         tell |= {"vpls": vpls, "seed": seed, "settings": {name: getattr(params, name[4:]) for name in SETTINGS}}
+    broken = int((~np.isfinite(made.radiance)).any(axis=-1).sum())
+    if broken:
+        raise OutputError(f"{scene.path}: {broken} pixels of the reference are not finite; look for extreme numbers")
     tell["hit_fraction"] = float(made.hit.mean())
     return replace(made, meta={**tell, **made.meta, "seconds": round(time.perf_counter() - start, 3)})
 
@@ -114,6 +118,8 @@ def _check(
     if spp is not None and vpls is not None:
         raise SettingError("spp and vpls: a reference is either of paths or of VPLs; give one of the two")
     numbers = {"width": size[0], "height": size[1], "spp": spp, "vpls": vpls, "bounces": bounces, "seed": seed}
+    if bounces > MOST_BOUNCES:
+        raise SettingError(f"bounces: is {bounces}, but {MOST_BOUNCES} are the most")
     for name, number in numbers.items():
         least = 0 if name in ("bounces", "seed") else 1
         if number is not None and number < least:

@@ -12,11 +12,9 @@ from typing import Any
 from . import reference as references
 from .errors import SettingError, did_you_mean
 from .loading import load
+from .options import chosen_size, notes
 from .path_tracer import Progress
-from .scene import Scene
-from .scene_file import parse_size
 
-DEFAULT_SIZE = (512, 512)
 BOUNCES = "vpl.bounces"
 """A render's name for what is --bounces here."""
 
@@ -25,19 +23,19 @@ def reference(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int
     """Trace what the command line asks for; an exit status."""
     output = Path(arguments.output)
     references.check_path(output)
-    size = _size(arguments.size)
     for name in settings:
         if name not in (*references.SETTINGS, BOUNCES):
             known = (*references.SETTINGS, BOUNCES)
             raise SettingError(f"--set {name}: no such setting of a reference{did_you_mean(name, known)}")
     scene = load(arguments.scene)
-    for note in (*scene.notes, *_chosen(scene)):
+    size = chosen_size(arguments.size, scene.render)
+    for note in notes(scene):
         print(f"note: {note}", file=sys.stderr)
     usual = scene.render.set if arguments.vpls is not None else {}
     with _progress_bar() as progress:
         made = references.reference(
             scene,
-            size or scene.render.size or DEFAULT_SIZE,
+            size,
             spp=arguments.spp,
             vpls=arguments.vpls,
             bounces=_bounces(arguments.bounces, {**scene.render.set, **settings}),
@@ -53,25 +51,12 @@ def reference(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int
     return 0
 
 
-def _size(text: str | None) -> tuple[int, int] | None:
-    if text is None:
-        return None
-    size = parse_size(text)
-    if size is None:
-        raise SettingError(f"--size {text}: wants WIDTHxHEIGHT in pixels, both above 0, such as 512x512")
-    return size
-
-
 def _bounces(given: int | None, settings: Mapping[str, Any]) -> int:
     """--bounces, else vpl.bounces, else 1."""
     value = settings.get(BOUNCES, 1) if given is None else given
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
         raise SettingError(f"set {BOUNCES}: is {value!r}, but wants a whole number from 0 up")
     return value
-
-
-def _chosen(scene: Scene) -> Iterator[str]:
-    yield from (f"no {what} in the file: {how.get('why', 'one was chosen')}" for what, how in scene.chosen.items())
 
 
 def _summary(meta: Mapping[str, Any]) -> str:

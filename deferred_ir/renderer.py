@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from numbers import Integral
 from pathlib import Path
 from types import TracebackType
@@ -64,8 +65,9 @@ class Renderer:
         self._buffers: SceneBuffers | None = None
         self._tracer: Tracer | None = None
         self._scene: Scene | None = None
+        self._closed = False
 
-    def graph(self, vpls: int | None) -> Graph:
+    def graph(self, vpls: int | None = None) -> Graph:
         """The graph with this number of VPLs, None for its own."""
         if vpls not in self._graphs:
             count = {} if vpls is None else {"vpl.count": vpls}
@@ -74,6 +76,8 @@ class Renderer:
 
     def plan(self, scene: Scene, vpls: int | None = None, outputs: Sequence[str] | None = None) -> Plan:
         """What a frame of `scene` runs; `outputs` are all that the graph has unless some are named."""
+        if not isinstance(scene, Scene):
+            raise SettingError(f"scene: is {type(scene).__name__}, not a Scene; load it first: deferred_ir.load(...)")
         graph, known = self.graph(vpls), scene.facts
         wanted = tuple(graph.outputs if outputs is None else outputs)
         key = (vpls, known, wanted)
@@ -85,7 +89,8 @@ class Renderer:
 
     def render(self, scene: Scene, *, vpls: int | None = None, seed: int = 0, time: float = 0.0) -> Image:
         """One image of `scene` at `time` seconds with `vpls` VPLs (None: as many as the graph says)."""
-        plan = self.plan(scene, vpls)
+        images = [name for name in self.graph(vpls).outputs if name in IMAGES]
+        plan = self.plan(scene, vpls, images)
         self.draw(scene, plan, seed=seed, time=time)
         return self.read(plan)
 
@@ -93,17 +98,16 @@ class Renderer:
         """Draw one whole frame and wait for it; what it took is added to `record`."""
         if not isinstance(seed, Integral) or seed < 0:
             raise SettingError(f"seed {seed!r}: wants a whole number of 0 or more")
+        if self._closed:
+            raise SettingError("Renderer: is closed; make a new one")
         with self.gpu.ctx:
             self._upload(scene)
             assert self._buffers
             start = clock.perf_counter()
             frame = Frame(self.size, scene.at(time), self._buffers, self.tracer, seed, time)
             timers = self._timers if record else None
-            if timers:
-                timers.begin()
-            self.executor.run(plan, frame, timers)
-            if timers:
-                timers.end()
+            with timers.frame() if timers else nullcontext():
+                self.executor.run(plan, frame, timers)
             self.gpu.ctx.finish()
             if record and timers:
                 record.frame_ms.append((clock.perf_counter() - start) * 1e3)
@@ -118,7 +122,11 @@ class Renderer:
     def read(self, plan: Plan) -> Image:
         """The image that the last `draw` of `plan` made."""
         with self.gpu.ctx:
-            arrays = {name: self.executor.resource(source).read()[::-1] for name, source in plan.outputs.items()}
+            arrays = {
+                name: self.executor.resource(source).read()[::-1]
+                for name, source in plan.outputs.items()
+                if name in IMAGES
+            }
         radiance, display = arrays.get("radiance"), arrays.get("display")
         return Image(
             None if radiance is None else np.ascontiguousarray(radiance[..., :3]),
@@ -160,7 +168,10 @@ class Renderer:
         self._buffers = self._tracer = self._scene = None
 
     def close(self) -> None:
-        """Give the context and all in it back."""
+        """Give the context and all in it back; a second time does nothing."""
+        if self._closed:
+            return
+        self._closed = True
         with self.gpu.ctx:
             self._forget()
             self._timers.release()

@@ -62,7 +62,7 @@ def _bias(renderer: Renderer, scene: Scene, graph: Graph) -> dict[str, float] | 
 
 def write(path: Path, data: dict[str, Any]) -> None:
     """Write JSON whole or not at all."""
-    text = json.dumps(data, indent=1) + "\n"
+    text = json.dumps(data, indent=1, allow_nan=False) + "\n"
 
     def fill(part: Path) -> None:
         part.write_text(text, encoding="utf-8")

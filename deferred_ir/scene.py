@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from .camera import Camera
+from .camera import Camera, view_fault
+from .errors import SceneError
 from .graph import Facts
 from .lights import Spotlight
 from .motion import ModelMotion
@@ -146,7 +147,15 @@ class Scene:
         return Facts(emits=any(self.spotlight.emission))
 
     def at(self, time: float) -> Scene:
-        """The scene with its camera and spotlight at `time` seconds."""
+        """The scene with camera and spotlight at `time` seconds; SceneError if one of them meets what it looks at."""
         if self.camera.motion is None and self.spotlight.motion is None:
             return self
-        return replace(self, camera=self.camera.at(time), spotlight=self.spotlight.at(time))
+        camera, light = self.camera.at(time), self.spotlight.at(time)
+        views = {
+            "camera": view_fault(camera.position, camera.look_at, camera.up),
+            "spotlight": view_fault(light.position, light.look_at),
+        }
+        for name, fault in views.items():
+            if fault:
+                raise SceneError(f"{self.path}: {name}.motion: at {time:g} s {fault[0]} {fault[1]}")
+        return replace(self, camera=camera, spotlight=light)

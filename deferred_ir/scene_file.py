@@ -12,9 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from .camera import Camera
+from .camera import Camera, view_fault
 from .checks import Faults, Table
 from .errors import SceneError, did_you_mean, shown
 from .lights import Spotlight
@@ -24,6 +22,7 @@ from .typing import Vec3
 
 KINDS = ("lissajous", "keyframes")
 SIZE = re.compile(r"\s*(\d{1,9})\s*[xX]\s*(\d{1,9})\s*")
+NAME = re.compile(r"[^/\\%\x00-\x1f\x7f]{1,100}")
 
 
 @dataclass(frozen=True)
@@ -58,6 +57,8 @@ def read(path: Path) -> SceneFile:
         raise SceneError(f"{path}: not a TOML file: {' '.join(str(error).split())}") from error
     root = Table(faults, "", data, ("name", "model", "camera", "spotlight", "render"))
     name = root.string("name")
+    if name and not NAME.fullmatch(name):
+        root.fault("name", f"{shown(name)}: names pictures; leave slashes, percent and control characters out of it")
     models = _models(root, path.parent)
     camera, spotlight, render = _camera(root), _spotlight(root), _render(root, path.parent)
     if faults.found:
@@ -151,8 +152,10 @@ def _spotlight(root: Table) -> Spotlight | None:
     motion = _spotlight_motion(table)
     if position is None or look_at is None or emission is None:
         return None
-    _check_view(table, "look_at", position, look_at)
-    return Spotlight(position, look_at, fov, emission, radius, motion)
+    light = Spotlight(position, look_at, fov, emission, radius, motion)
+    # Around a Lissajous figure's middle the light may well look at that.
+    _check_view(table, "look_at", light.at(0.0).position, light.at(0.0).look_at)
+    return light
 
 
 def _spotlight_motion(spotlight: Table) -> SpotlightMotion | None:
@@ -196,19 +199,11 @@ def _fov(table: Table, default: float) -> float:
 
 
 def _check_view(table: Table, key: str, position: Vec3, look_at: Vec3, up: Vec3 | None = None) -> None:
-    """Note a fault where the view has no direction, or `up` lies along it."""
-    view = np.subtract(look_at, position)
-    length = math.hypot(*view)
-    if length <= 1e-9 * max(map(abs, position + look_at)):
-        table.fault(key, "is the same point as the position; move one of them")
-        return
-    if up is None:
-        return
-    up_length = math.hypot(*up)
-    if up_length == 0:
-        table.fault("up", "must not be zero; [0, 1, 0] is the usual one")
-    elif np.linalg.norm(np.cross(view / length, np.divide(up, up_length))) < 1e-6:
-        table.fault(key if "[" in key else "up", "up lies along the direction of view; turn it to the side")
+    """Note a fault where the view has no direction, or `up` lies along it; `key` is where the view stands."""
+    fault = view_fault(position, look_at, up)
+    if fault:
+        name, why = fault
+        table.fault(key if "[" in key or name == "look_at" else name, why)
 
 
 def _render(root: Table, folder: Path) -> RenderDefaults:

@@ -70,8 +70,6 @@ class ShadowMaps(Pass):
         for start in range(0, total, LIGHTS_PER_BLOCK):
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
             frame.buffers.draw(program, instances=min(LIGHTS_PER_BLOCK, total - start))
-        for side in range(4):
-            gpu.ctx.disable_direct(raw.CLIP_DISTANCE0 + side)
         io.count("maps_drawn", total)
 
 

@@ -106,7 +106,7 @@ def main() -> None:
     parser.add_argument("scenes", nargs="+", metavar="SCENE")
     parser.add_argument("--vpls", type=int, default=64)
     parser.add_argument("--size", type=parse_size, default=(512, 512))
-    parser.add_argument("--frames", type=int, default=9)
+    parser.add_argument("--frames", type=int, default=9, choices=range(2, 1000), metavar="N")
     arguments = parser.parse_args()
     for name in arguments.scenes:
         scene = load(name)

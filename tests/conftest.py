@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import hypothesis
 import pytest
 
 from deferred_ir.gl.gpu import Gpu
 from deferred_ir.renderer import Renderer
+
+# The same examples in every run, and no clocks: a busy machine must not fail a test.
+hypothesis.settings.register_profile("project", deadline=None, derandomize=True)
+hypothesis.settings.load_profile("project")
 
 
 @pytest.fixture(scope="session")

@@ -171,6 +171,41 @@ def test_the_scenes_render_table_is_the_default_and_the_command_line_wins(tmp_pa
     assert (run["size"], run["vpls"], run["seed"]) == ([32, 32], 4, 6)
 
 
+def test_the_command_lines_vpl_count_wins_over_the_scenes(tmp_path, box, capsys):
+    scene, file = box(extra="[render]\nvpls = 4\n"), tmp_path / "run.json"
+    arguments = [scene, "--set", "vpl.count=16"]
+    assert main(["render", *arguments, "--size", "16x16", "--device", "software", "--json", str(file)]) == 0
+    assert json.loads(file.read_text())["vpls"] == 16
+    assert main(["graph", "deferred", "--scene", *arguments]) == 0
+    assert "17 light" in capsys.readouterr().out
+
+
+def test_only_numbers_of_the_form_04d_are_frames(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["render", "cornell", *SMALL, "-o", "50%done.png"]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["50%done.png"]
+
+
+@pytest.mark.parametrize("name", ["../escaped", "a/b", "f%04d", "a\nb"])
+def test_a_scenes_name_cannot_choose_the_folder(name, tmp_path, box, capsys):
+    scene = box(("[[model]]", f"name = {json.dumps(name)}\n[[model]]"))
+    assert "name" in fault(capsys, tmp_path, "render", scene)
+
+
+def test_a_light_that_meets_its_target_on_its_way_is_told(tmp_path, box, capsys):
+    motion = '[spotlight.motion]\nkind = "lissajous"\namplitude = [0, 0, 0.3]\nspeed = [0.0, 1.0]\n'
+    scene = box(("look_at = [0, -1, 0]", "look_at = [0, 0.9, 0.3]"), extra=motion)
+    assert main(["render", scene, *SMALL, "-o", str(tmp_path / "o.npy")]) == 0
+    scene = box(
+        ("position = [0, 0.9, 0]\nlook_at = [0, -1, 0]", "position = [0, 0.9, 0]\nlook_at = [0, 0.9, 0]"),
+        extra='[spotlight.motion]\nkind = "keyframes"\ntimes = [0, 1]\npositions = [[0, 0.8, 0], [0, -0.8, 0]]\n'
+        "look_ats = [[0, 0, 0], [0, 0, 0]]\n",
+    )
+    (tmp_path / "o.npy").unlink()
+    line = fault(capsys, tmp_path, "render", scene, *SMALL, "--frames", "20", "-o", str(tmp_path / "o.npy"))
+    assert "spotlight.motion: at 0.5 s" in line
+
+
 def test_set_reaches_the_passes(tmp_path):
     images = []
     for extra in ((), ("--set", "vpl.pattern=random"), ("--set", "vpl.fov=90")):
@@ -235,6 +270,14 @@ def test_a_faulty_model_is_one_line(obj, words, tmp_path, capsys, box):
         (["render", "cornell", "-o", "image.jpg"], ["image.jpg", ".png"]),
         (["render", "cornell", "-o", "no_such_folder/o.png"], ["no_such_folder"]),
         (["render", "cornell", "--json", "no_such_folder/run.json"], ["no_such_folder"]),
+        (["render", "cornell", "-o", "a" * 300 + ".png"], ["too long"]),
+        (["render", "cornell", "-o", "x.png", "--json", "x.png"], ["x.png", "twice"]),
+        (["render", "cornell", "-o", "x.png", "-o", "./x.png"], ["x.png", "twice"]),
+        (["render", "cornell", "--graph", ""], ["graph ''"]),
+        (["render", "cornell", "--device", ""], ["device ''"]),
+        (["render", "cornell", "--vpls", "4", "--set", "vpl.count=9"], ["--vpls 4", "vpl.count=9"]),
+        (["render", "cornell", "--vpls", "4", "--set", "shadow_maps.budget=1"], ["spot_size", "16 MiB"]),
+        (["reference", "cornell", "-o", "r.npy", "--bounces", "65"], ["bounces", "64"]),
         (["graph", "nonesuch"], ["nonesuch"]),
         (["rendr"], ["rendr"]),
         ([], ["COMMAND"]),

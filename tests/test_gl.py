@@ -108,11 +108,10 @@ def test_a_pending_error_is_told_once(gpu):
 def test_laps_follow_one_another_and_span_the_frame(gpu):
     timers = Timers(gpu)
     for _ in range(2):
-        timers.begin()
-        for label in ("first", "second"):
-            timers.mark(label)
-            time.sleep(0.01)
-        timers.end()
+        with timers.frame():
+            for label in ("first", "second"):
+                timers.mark(label)
+                time.sleep(0.01)
     assert timers.collect() == []  # still in flight
     frames = timers.collect(wait=True)
     assert len(frames) == 2
@@ -121,4 +120,20 @@ def test_laps_follow_one_another_and_span_the_frame(gpu):
         assert all(9 < cpu < 500 for _, cpu in laps.values())
         assert all(gpu_ms >= 0 for gpu_ms, _ in laps.values())
     assert timers.collect(wait=True) == []
+    timers.release()
+
+
+def test_a_frame_that_fails_leaves_no_laps(gpu):
+    timers = Timers(gpu)
+
+    def fail():
+        with timers.frame():
+            timers.mark("first")
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        fail()
+    with timers.frame():
+        timers.mark("only")
+    assert [list(laps) for laps in timers.collect(wait=True)] == [["only"]]
     timers.release()

@@ -104,7 +104,7 @@ def test_bounces_also_go_by_the_name_they_have_in_a_render(tmp_path):
         (["--vpls", "4", "--set", "vpl.clamp=-1"], ["vpl.clamp", "-1"]),
         (["--vpls", "4", "--set", "vpl.pattern=sobl"], ["vpl.pattern", "did you mean 'sobol'"]),
         (["--vpls", "4", "--set", "vpl.bounces=few"], ["vpl.bounces", "few"]),
-        (["--vpls", "4", "--bounces", "1000"], ["vpl.bounces", "1000"]),
+        (["--vpls", "4", "--bounces", "1000"], ["bounces", "1000"]),
         (["--spp", "4", "--set", "vpl.clamp=0.1"], ["vpl.clamp", "--vpls"]),
         (["-o", "o.png"], ["o.png", ".npy"]),
         (["-o", "missing/o.npy"], ["missing"]),

@@ -112,7 +112,7 @@ def test_after_an_error_a_plan_without_the_pass_is_fine(renderer, tmp_path):
     one = renderer(SIZE, tmp_path / "own.toml", passes={"invert": pass_in(tmp_path)})
     for _ in range(2):
         with pytest.raises(ShaderError, match=r"^invert\.frag:1: "):
-            one.render(room(), vpls=4)
+            one.draw(room(), one.plan(room(), 4))
     plan = one.plan(room(), 4, ["radiance"])
     one.draw(room(), plan)
     np.testing.assert_array_equal(one.read(plan).radiance, renderer(SIZE).render(room(), vpls=4).radiance)

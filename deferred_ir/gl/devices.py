@@ -143,6 +143,8 @@ def create_context(device: str = "auto") -> tuple[moderngl.Context, Loader, Devi
     or part of a device's name. `auto` follows GLCONTEXT_DEVICE_INDEX; any other choice overrules it.
     Raises DeviceError (one line, with the mend) where there is no such device or it cannot do 4.3.
     """
+    if not device.strip():
+        raise DeviceError("device '': names none; take auto, or one that `deferred-ir devices` lists")
     if sys.platform == "win32":
         return _chosen(*_create_default())
     if sys.platform == "darwin":

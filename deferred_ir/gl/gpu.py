@@ -49,9 +49,11 @@ class Gpu:
         return self._samplers[key]
 
     def reset(self) -> None:
-        """The state that each pass starts from: no tests, no blending, all writes on."""
+        """The state that each pass starts from: no tests, no clipping, no blending, all writes on."""
         ctx = self.ctx
         ctx.disable(ctx.DEPTH_TEST | ctx.CULL_FACE | ctx.BLEND)
+        for side in range(4):
+            ctx.disable_direct(raw.CLIP_DISTANCE0 + side)
         self.gl.DepthMask(1)
         self.gl.ColorMask(1, 1, 1, 1)
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import DeviceError
 from ..graph import Buffer, Texture
 from . import raw
 from .gpu import Gpu
@@ -59,7 +60,11 @@ class GpuTexture:
             gl.TexStorage3D(self.target, 1, self.format.internal, *size, description.layers)
         else:
             gl.TexStorage2D(self.target, 1, self.format.internal, *size)
-        gl.check(f"texture {description} of {self.nbytes / 2**20:.0f} MiB")
+        try:
+            gl.check(f"texture {description} of {self.nbytes / 2**20:.0f} MiB")
+        except DeviceError:
+            self.release()
+            raise
 
     def upload(self, pixels: Any) -> None:
         """Fill a 2D texture from (H, W, channels) rows, bottom row first, in the format's dtype."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 import time
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -23,16 +25,25 @@ class _Marks:
 
 
 class Timers:
-    """Laps of a frame: each `mark` ends the lap before it and starts one, `end` ends the last."""
+    """Laps of a frame: each `mark` ends the lap before it and starts one; the frame's end ends the last."""
 
     def __init__(self, gpu: Gpu) -> None:
         self.gpu = gpu
         self._free: list[int] = []
         self._frames: deque[_Marks] = deque()
 
-    def begin(self) -> None:
-        """Start a frame."""
-        self._frames.append(_Marks())
+    @contextmanager
+    def frame(self) -> Iterator[None]:
+        """A frame's laps; one that fails midway is dropped."""
+        marks = _Marks()
+        self._frames.append(marks)
+        try:
+            yield
+            self.mark("end")
+        except BaseException:
+            self._frames.remove(marks)
+            self._free.extend(marks.queries)
+            raise
 
     def mark(self, label: str) -> None:
         """Start the lap `label`; call it once the pass's framebuffer is bound: that ends the work of the one before."""
@@ -46,10 +57,6 @@ class Timers:
         marks.labels.append(label)
         marks.queries.append(query)
         marks.cpu.append(time.perf_counter())
-
-    def end(self) -> None:
-        """End the frame's last lap."""
-        self.mark("end")
 
     def collect(self, wait: bool = False) -> list[dict[str, tuple[float, float]]]:
         """Finished frames, oldest first: label -> (GPU ms, CPU ms). `wait` also takes those still in flight."""

@@ -38,13 +38,13 @@ vec3 spot_irradiance(Light light, vec3 position, vec3 normal, vec3 shading_norma
     return light.emission * (cone * cosines * inverse_square);
 }
 
-// I(w) = E_i cos(theta_y) inside a round cone, dark outside. One division and no root: this is the innermost loop.
+// I(w) = E_i cos(theta_y) inside a round cone, dark outside. No root: this is the innermost loop.
 vec3 vpl_irradiance(Light light, vec3 position, vec3 normal, vec3 shading_normal) {
     vec3 from = position - light.position;
     float square = dot(from, from);
     float leaving = max(dot(light.z_axis, from), 0.0), edge = 1.0 - light.one_minus_cos;
     float inside = step(edge * edge * square, leaving * leaving);
     float cosines = leaving * receiving(-from, normal, shading_normal);
-    // Both cosines bring a distance; together with 1/max(d^2, c^2) the denominator is d^2 max(d^2, c^2).
-    return light.emission * (inside * cosines / max(square * max(square, light.clamp_squared), TINY));
+    // The cosines bring a distance each. Two divisions: the fourth power of a small distance would vanish.
+    return light.emission * (inside * cosines / max(square, TINY) / max(max(square, light.clamp_squared), TINY));
 }

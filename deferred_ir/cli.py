@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import threading
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
+from . import interrupts
 from .errors import Error, SettingError
 
 SET_HELP = "a parameter of a pass, e.g. --set shadow_maps.vpl_size=512; may be repeated"
@@ -24,6 +26,8 @@ class Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status."""
     arguments = _parser().parse_args(argv)
+    if threading.current_thread() is threading.main_thread():
+        interrupts.install()
     try:
         status: int = arguments.run(arguments)
         sys.stdout.flush()
@@ -53,14 +57,25 @@ def _parser() -> Parser:
     render = command("render", _render, "Render a scene to images.")
     render.add_argument("scene", metavar="SCENE", help="a built-in scene, a scene file (.toml) or a model")
     render.add_argument(
-        "-o", "--output", action="append", default=[], metavar="OUT", help="image: .png, .exr or .npy; may be repeated"
+        "-o",
+        "--output",
+        action="append",
+        default=[],
+        metavar="OUT",
+        help="image: .png, .exr or .npy (%%04d: the frame); may be repeated",
     )
     render.add_argument("--graph", metavar="NAME|FILE", help="render graph (default: deferred)")
     render.add_argument("--size", metavar="WxH", help="pixels (default: 512x512)")
     render.add_argument("--vpls", type=_count, metavar="N", help="virtual point lights (default: 64)")
     render.add_argument("--seed", type=_count, metavar="N", help="of the samples (default: 0)")
     render.add_argument("--device", default="auto", metavar="D", help="see `deferred-ir devices` (default: auto)")
-    render.add_argument("--frames", type=_positive, default=1, metavar="N", help="frame i shows time i/30 s")
+    render.add_argument(
+        "--frames",
+        type=_positive,
+        default=1,
+        metavar="N",
+        help="frame i shows time i/30 s",
+    )
     render.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
     render.add_argument("--json", metavar="RUN.json", help="write what was rendered, and how long it took")
 

@@ -25,7 +25,7 @@ ENCLOSED = 0.75
 """A point is inside where this part of the rays from it meets a surface: an open side of a box (5/6) still counts."""
 ROOMY = 0.03
 """A point with a surface nearer than this part of the scene's diagonal is a gap between things and no room."""
-SOLID = 0.95
+SOLID = 0.75
 """A point is within a solid where this part of the surfaces around it shows it their backs."""
 INSIDE_FOV, OUTSIDE_FOV, ROOM_LIGHT_FOV = 75.0, 45.0, 120.0
 VIEW_FROM = np.array([0.55, 0.45, 1.0])

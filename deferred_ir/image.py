@@ -67,7 +67,7 @@ def _exr(path: Path, pixels: Any) -> None:
 def check_path(path: str | os.PathLike[str]) -> None:
     """Raise OutputError if `path` cannot be a result: better before the work than after it."""
     path = Path(path)
-    if path.suffix.lower() not in SUFFIXES:
+    if path.suffix.lower() not in SUFFIXES and not os.path.isdir(path):
         raise OutputError(f"{path}: unknown kind of image '{path.suffix}'{did_you_mean(path.suffix, SUFFIXES)}")
     check_folder(path)
 

@@ -35,8 +35,8 @@ class MapParams:
                 )
             raise GraphError(
                 f"maps for {vpls} VPLs of {self.vpl_size}x{self.vpl_size} need {nbytes // 2**20} MiB, and "
-                f"shadow_maps.budget is {self.budget}; {max(fits, 0)} VPLs fit; use fewer, a smaller "
-                "shadow_maps.vpl_size or a larger budget"
+                f"shadow_maps.budget is {self.budget}; {max(fits, 0)} VPLs fit, all bounces together; "
+                "use fewer, a smaller shadow_maps.vpl_size or a larger budget"
             )
 
     def defines(self) -> dict[str, int | float]:

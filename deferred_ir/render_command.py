@@ -34,7 +34,7 @@ def render(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
         _check_files(outputs, json)
     graph_name = arguments.graph if arguments.graph is not None else defaults.graph or "deferred"
     seed = arguments.seed if arguments.seed is not None else defaults.seed or 0
-    for note in _notes(scene, arguments.frames):
+    for note in _notes(scene, outputs, arguments.frames):
         print(f"note: {note}", file=sys.stderr)
     with Renderer(
         chosen_size(arguments.size, defaults),
@@ -48,17 +48,23 @@ def render(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
         record = Record() if json else None
         if record:
             renderer.draw(scene, plan, seed=seed)  # compiles, allocates: not what a frame costs
+        black = bool(outputs)
         for i in _progress(arguments.frames):
             renderer.draw(scene, plan, seed=seed, time=i / FRAMES_PER_SECOND, record=record)
             last = i == arguments.frames - 1
             due = [name for name in outputs if last or _NUMBER.search(name)]
             if due:
                 image = renderer.read(plan)
+                black = black and not any(part.any() for part in (image.radiance, image.display) if part is not None)
                 for name in due:
                     image.save(_numbered(name, i))
         if json and record:
             renderer.finish(record)
             write(json, run_record(renderer, scene, str(graph_name), graph, plan, seed=seed, record=record))
+    if black:
+        print("note: the picture is black: the camera sees nothing that is lit", file=sys.stderr)
+    if outputs:
+        print(f"wrote {', '.join(_told(name, arguments.frames) for name in outputs)}", file=sys.stderr)
     return 0
 
 
@@ -91,8 +97,19 @@ def _numbered(name: str, frame: int) -> Path:
     return Path(_NUMBER.sub(lambda match: match[0] % frame, name))
 
 
-def _notes(scene: Scene, frames: int) -> Iterator[str]:
+def _told(name: str, frames: int) -> str:
+    """The file or files that an output became."""
+    first, last = (str(_numbered(name, i)) for i in (0, frames - 1))
+    return first if first == last else f"{first} to {last}"
+
+
+def _notes(scene: Scene, outputs: list[str], frames: int) -> Iterator[str]:
     yield from notes(scene)
+    if frames > 1:
+        for name in outputs:
+            if not _NUMBER.search(name):
+                path = Path(name)
+                yield f"{name} keeps the last of {frames} frames; {path.stem}_%04d{path.suffix} keeps all"
     if scene.spotlight.radius > 0:
         yield "spotlight.radius: soft shadows are not drawn yet; the light is taken as a point"
     if frames > 1 and any(model.motion for model in scene.models):

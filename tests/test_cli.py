@@ -100,6 +100,15 @@ def test_without_output_the_picture_takes_the_scenes_name(tmp_path, monkeypatch)
     assert [path.name for path in tmp_path.iterdir()] == ["cornell.png"]
 
 
+def test_a_black_picture_and_frames_that_are_lost_are_told(tmp_path, box, capsys):
+    away = box(("look_at = [0, 0, 0]", "look_at = [0, 0, 9]"), ("position = [0, 0, 0.9]", "position = [0, 0, 5]"))
+    assert main(["render", away, *SMALL, "--frames", "2", "-o", str(tmp_path / "o.png")]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert any("o_%04d.png keeps all" in line for line in lines)
+    assert "note: the picture is black: the camera sees nothing that is lit" in lines
+    assert lines[-1] == f"wrote {tmp_path / 'o.png'}"
+
+
 def test_run_json_holds_what_the_contract_promises(tmp_path):
     file = tmp_path / "run.json"
     assert main(["render", "cornell", *SMALL, "--frames", "6", "--seed", "3", "--json", str(file)]) == 0
@@ -202,6 +211,7 @@ def test_a_light_that_meets_its_target_on_its_way_is_told(tmp_path, box, capsys)
         "look_ats = [[0, 0, 0], [0, 0, 0]]\n",
     )
     (tmp_path / "o.npy").unlink()
+    capsys.readouterr()
     line = fault(capsys, tmp_path, "render", scene, *SMALL, "--frames", "20", "-o", str(tmp_path / "o.npy"))
     assert "spotlight.motion: at 0.5 s" in line
 

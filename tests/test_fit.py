@@ -107,6 +107,15 @@ def test_an_object_is_seen_whole_from_outside(tmp_path: Path, mesh: trimesh.Trim
     assert mean_irradiance(scene) == pytest.approx(1, rel=0.03)
 
 
+def test_a_box_on_the_ground_is_seen_from_outside(tmp_path: Path) -> None:
+    """The middle of the bounds is in the box, whose bottom coincides with the ground."""
+    ground = trimesh.Trimesh([(-3, 0, -3), (-3, 0, 3), (3, 0, 3), (3, 0, -3)], [(0, 1, 2), (0, 2, 3)], process=False)
+    box = trimesh.creation.box((1, 1, 1))
+    box.apply_translation((0, 0.5, 0))
+    scene = load(tmp_path, trimesh.util.concatenate([ground, box]))
+    assert "outside" in scene.chosen["camera"]["why"]
+
+
 def test_what_the_file_says_stays(tmp_path: Path) -> None:
     camera = "[camera]\nposition = [2, 0, 1]\nlook_at = [0, -1, 0]\nfov = 50\n"
     scene = load(tmp_path, room(), camera)

@@ -8,18 +8,17 @@ mean over seeds. Writes clamp.json and clamp.svg; needs the extra `report`.
 
 from __future__ import annotations
 
-import argparse
-import json
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
 from deferred_ir import vpl_reference
-from deferred_ir.image import write_whole
 from deferred_ir.loading import load
 from deferred_ir.metrics import relmse
 from deferred_ir.path_tracer import PathTracer
+from deferred_ir.profiling.output import arguments, panels
+from deferred_ir.run_record import write
 from deferred_ir.scene import Scene
 from deferred_ir.tracing import Tracer
 from deferred_ir.vpls import cast
@@ -52,24 +51,12 @@ def measure(scene: Scene, fov: float) -> dict[str, list[float]]:
 
 def plot(results: dict[str, Any], path: Path) -> None:
     """A log-log panel for each scene."""
-    import matplotlib as mpl
-
-    mpl.use("svg")
-    mpl.rcParams["svg.hashsalt"] = "clamp"  # the same figures give the same file
-    import matplotlib.pyplot as plt
-
-    figure, panels = plt.subplots(1, len(results), figsize=(4.2 * len(results), 3.8), squeeze=False)
-    for panel, (name, errors) in zip(panels[0], results.items(), strict=True):
-        for count, line in errors.items():
-            panel.loglog(CLAMPS, line, "o-", ms=3, label=f"{count} VPLs")
-        panel.axvline(0.02, color="grey", lw=0.8, ls=":")
-        panel.set_title(name)
-        panel.set_xlabel("clamp distance / diagonal")
-        panel.grid(alpha=0.3)
-        panel.legend(fontsize=8)
-    panels[0][0].set_ylabel("relMSE")
-    figure.tight_layout()
-    write_whole(path, lambda part: figure.savefig(part, format="svg", metadata={"Date": None}))
+    with panels(results, path, "relMSE") as axes:
+        for panel, errors in zip(axes, results.values(), strict=True):
+            for count, line in errors.items():
+                panel.loglog(CLAMPS, line, "o-", ms=3, label=f"{count} VPLs")
+            panel.axvline(0.02, color="grey", lw=0.8, ls=":")
+            panel.set_xlabel("clamp distance / diagonal")
 
 
 def table(results: dict[str, Any]) -> str:
@@ -83,22 +70,14 @@ def table(results: dict[str, Any]) -> str:
 
 def main() -> None:
     """Measure, write, print."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("scenes", nargs="+", metavar="SCENE")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    parser = arguments(__doc__)
     parser.add_argument("--fov", type=float, default=150.0, help="of the VPLs' cones, degrees")
-    arguments = parser.parse_args()
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    results = {(scene := load(name)).name: measure(scene, arguments.fov) for name in arguments.scenes}
-    text = json.dumps(
-        {"clamps": CLAMPS, "fov": arguments.fov, "seeds": SEEDS, "size": SIZE, "relmse": results}, indent=1
-    )
-
-    def fill(part: Path) -> None:
-        part.write_text(text + "\n", encoding="utf-8")
-
-    write_whole(arguments.output / "clamp.json", fill)
-    plot(results, arguments.output / "clamp.svg")
+    chosen = parser.parse_args()
+    chosen.output.mkdir(parents=True, exist_ok=True)
+    results = {(scene := load(name)).name: measure(scene, chosen.fov) for name in chosen.scenes}
+    settings = {"clamps": CLAMPS, "fov": chosen.fov, "seeds": SEEDS, "size": SIZE}
+    write(chosen.output / "clamp.json", {**settings, "relmse": results})
+    plot(results, chosen.output / "clamp.svg")
     print(table(results))
 
 

@@ -8,17 +8,16 @@ many seeds, so that only the sampling error is left. Writes patterns.json and pa
 
 from __future__ import annotations
 
-import argparse
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from tqdm import tqdm
 
-from deferred_ir.image import write_whole
 from deferred_ir.loading import load
+from deferred_ir.profiling.output import arguments, panels
 from deferred_ir.renderer import Renderer
+from deferred_ir.run_record import write
 from deferred_ir.sampling import PATTERNS
 from deferred_ir.scene import Scene
 
@@ -64,29 +63,18 @@ def measure(scene: Scene) -> dict[str, Any]:
 
 def plot(results: dict[str, Any], path: Path) -> None:
     """A log-log panel for each scene: mean over seeds, and a band from the smallest to the largest."""
-    import matplotlib as mpl
-
-    mpl.use("svg")
-    mpl.rcParams["svg.hashsalt"] = "patterns"  # the same figures give the same file
-    import matplotlib.pyplot as plt
-
-    figure, panels = plt.subplots(1, len(results), figsize=(4.2 * len(results), 3.8), sharey=True, squeeze=False)
-    for panel, (name, result) in zip(panels[0], results.items(), strict=True):
-        for pattern, data in result["patterns"].items():
-            errors = np.array(data["errors"])
-            label = f"{pattern}, slope {data['slope']:.2f}"
-            (line,) = panel.loglog(COUNTS, errors.mean(axis=1), "o-", ms=3, label=label)
-            panel.fill_between(COUNTS, errors.min(axis=1), errors.max(axis=1), color=line.get_color(), alpha=0.15, lw=0)
-        panel.axhline(result["limit_noise"], color="grey", lw=0.8, ls=":")
-        panel.set_title(name)
-        panel.set_xlabel("VPLs")
-        panel.set_xticks(COUNTS, [str(count) for count in COUNTS])
-        panel.minorticks_off()
-        panel.grid(alpha=0.3)
-        panel.legend(fontsize=7)
-    panels[0][0].set_ylabel("RMSE / mean radiance")
-    figure.tight_layout()
-    write_whole(path, lambda part: figure.savefig(part, format="svg", metadata={"Date": None}))
+    with panels(results, path, "RMSE / mean radiance", share_y=True) as axes:
+        for panel, result in zip(axes, results.values(), strict=True):
+            for pattern, data in result["patterns"].items():
+                errors = np.array(data["errors"])
+                label = f"{pattern}, slope {data['slope']:.2f}"
+                (line,) = panel.loglog(COUNTS, errors.mean(axis=1), "o-", ms=3, label=label)
+                low, high = errors.min(axis=1), errors.max(axis=1)
+                panel.fill_between(COUNTS, low, high, color=line.get_color(), alpha=0.15, lw=0)
+            panel.axhline(result["limit_noise"], color="grey", lw=0.8, ls=":")
+            panel.set_xlabel("VPLs")
+            panel.set_xticks(COUNTS, [str(count) for count in COUNTS])
+            panel.minorticks_off()
 
 
 def table(results: dict[str, Any]) -> str:
@@ -101,19 +89,11 @@ def table(results: dict[str, Any]) -> str:
 
 def main() -> None:
     """Measure, write, print."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("scenes", nargs="+", metavar="SCENE")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    arguments = parser.parse_args()
-    arguments.output.mkdir(parents=True, exist_ok=True)
-    results = {(scene := load(name)).name: measure(scene) for name in arguments.scenes}
-    text = json.dumps({"counts": COUNTS, "seeds": SEEDS, "size": SIZE, "scenes": results}, indent=1)
-
-    def fill(part: Path) -> None:
-        part.write_text(text + "\n", encoding="utf-8")
-
-    write_whole(arguments.output / "patterns.json", fill)
-    plot(results, arguments.output / "patterns.svg")
+    chosen = arguments(__doc__).parse_args()
+    chosen.output.mkdir(parents=True, exist_ok=True)
+    results = {(scene := load(name)).name: measure(scene) for name in chosen.scenes}
+    write(chosen.output / "patterns.json", {"counts": COUNTS, "seeds": SEEDS, "size": SIZE, "scenes": results})
+    plot(results, chosen.output / "patterns.svg")
     print(table(results))
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixed_lights import lit_by, spot_record, vpl_records
-from small_scenes import build, plane, quad
+from small_scenes import build, plane, quad, sphere
 
 from deferred_ir.camera import Camera
 from deferred_ir.lights import Spotlight
@@ -264,3 +264,22 @@ def test_a_light_exactly_where_a_pixel_looks_gives_nothing_instead_of_a_division
     for size in ((1, 1), (3, 3)):
         image = lit_by(renderer, tmp_path, records, size, graph).render(scene)
         assert (image.radiance == 0).all()
+
+
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_inside_a_sphere_one_vpl_lights_every_point_alike(renderer, tmp_path, graph):
+    """Both ends of a chord make the same angle with it, so cos cos / d^2 = 1 / (4 R^2) for all of them."""
+    radius = 3.0
+    scene = build(
+        sphere(radius, 5, ALBEDO),
+        camera=Camera((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), 90.0),
+        spotlight=Spotlight((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), 60.0),
+    )
+    vpl = vpl_records([(0.0, -radius, 0.0)], [(0.0, 1.0, 0.0)], [(4.0, 2.0, 1.0)])
+    lights = np.concatenate([spot_record(scene, DARK), vpl])
+    # Nothing is hidden in a sphere; well off their faces, no points are shaded by the maps' texels either.
+    free = {"shadow_maps.vpl_offset": 3.0}
+    radiance = lit_by(renderer, tmp_path, lights, SIZE, graph, set=free).render(scene).radiance
+    expected = np.array(ALBEDO) / np.pi * (4.0, 2.0, 1.0) / (4 * radius**2)
+    # The facets stand up to 1e-3 inside the sphere.
+    np.testing.assert_allclose(radiance, np.broadcast_to(expected, radiance.shape), rtol=5e-3)

@@ -1,32 +1,56 @@
-"""Ctrl-C that is never lost: not even while modules are being imported.
+"""Ctrl-C that is never lost and breaks nothing.
 
-Some libraries catch BaseException around their own imports, so a KeyboardInterrupt raised there vanishes or leaves
-half a module behind. Until the import is over, the interrupt waits.
+A KeyboardInterrupt is raised wherever the main thread happens to be. Some libraries catch BaseException around their
+own imports, and compiled ones may ignore an exception and go on with half of their tables. So the interrupt waits until
+this package's own code, or a wait for threads, is at the top of the stack.
 """
 
 from __future__ import annotations
 
 import signal
+import time
 from types import FrameType
 
-RETRY = 0.05
-"""Seconds until the next look whether the import is over."""
+RETRY = 0.02
+"""Seconds until the next look at where the main thread is."""
+PATIENCE = 2.0
+"""Seconds after which the interrupt is raised in a library, too, but never during an import."""
 _IMPORT = "<frozen importlib._bootstrap>"
+_SAFE = ("deferred_ir", "__main__", "threading", "concurrent.futures")
+
+
+class _Handler:
+    """The handler of SIGINT, and of the timer that asks again."""
+
+    def __init__(self) -> None:
+        self.asked: float | None = None
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        now = time.monotonic()
+        self.asked = self.asked or now
+        if _importing(frame) or (not _safe(frame) and now < self.asked + PATIENCE):
+            signal.setitimer(signal.ITIMER_REAL, RETRY)
+            return
+        self.asked = None
+        raise KeyboardInterrupt
+
+
+def _importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename == _IMPORT:
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _safe(frame: FrameType | None) -> bool:
+    return frame is not None and str(frame.f_globals.get("__name__")).startswith(_SAFE)
 
 
 def install() -> None:
-    """Let SIGINT raise KeyboardInterrupt at the first moment outside an import; where signals cannot wait, at once."""
+    """Let SIGINT wait for a good moment; where there are no timers to ask again (Windows), all stays as it is."""
     if not hasattr(signal, "setitimer") or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         return
-    signal.signal(signal.SIGINT, _interrupt)
-    signal.signal(signal.SIGALRM, _interrupt)
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    del number
-    while frame is not None:
-        if frame.f_code.co_filename == _IMPORT:
-            signal.setitimer(signal.ITIMER_REAL, RETRY)
-            return
-        frame = frame.f_back
-    raise KeyboardInterrupt
+    handler = _Handler()
+    signal.signal(signal.SIGINT, handler)
+    signal.signal(signal.SIGALRM, handler)

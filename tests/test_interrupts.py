@@ -40,3 +40,20 @@ def test_outside_imports_it_comes_at_once():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=25)
     assert done.stdout == "at once\n"
+
+
+def test_a_library_that_is_at_work_is_not_torn_apart():
+    code = (
+        "import os, signal, sys; from deferred_ir import interrupts; interrupts.install()\n"
+        "library = {'__name__': 'library', 'os': os, 'signal': signal}\n"
+        "exec('''def work():\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+        "    return sum(1 for _ in range(100000))''', library)\n"
+        "done = None\n"
+        "try:\n"
+        "    done = library['work']()\n"
+        "    while True: pass\n"
+        "except KeyboardInterrupt: print('worked', done)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=25)
+    assert done.stdout == "worked 100000\n", done.stderr

@@ -1,0 +1,216 @@
+"""Graphs x numbers of VPLs x seeds: time and error of each point, kept on disk as soon as it is measured."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from deferred_ir import difference
+from deferred_ir.config import graph_hash, load_graph
+from deferred_ir.errors import GraphError, SettingError
+from deferred_ir.flip import FlipParameters
+from deferred_ir.gl.gpu import Gpu
+from deferred_ir.metrics import compare
+from deferred_ir.options import chosen_settings
+from deferred_ir.path_tracer import Progress
+from deferred_ir.renderer import IMAGES, Renderer
+from deferred_ir.scene import Scene
+from deferred_ir.timing import Record
+from deferred_ir.typing import Array
+
+from . import points, sweep_reference
+from .points import Key, Point
+from .sweep_reference import Truth
+
+FRAMES = 5
+"""Recorded frames of a point; one before them is not recorded."""
+OVERHEAD = 16
+"""What a frame costs beside its VPLs, in VPLs: for the time left that the progress bar tells."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """What is measured. size: (width, height). shard: (i, n), the i-th of n parts, from 1."""
+
+    scene: Scene
+    size: tuple[int, int]
+    graphs: Sequence[str]
+    vpls: Sequence[int]
+    seeds: int
+    device: str = "auto"
+    shard: tuple[int, int] = (1, 1)
+
+    def __post_init__(self) -> None:
+        for name, values in (("--graphs", self.graphs), ("--vpls", self.vpls), ("--seeds", range(self.seeds))):
+            if not values:
+                raise SettingError(f"{name}: leaves nothing to measure; name one at least")
+        hashes: dict[str, str] = {}
+        for graph in self.graphs:
+            loaded = load_graph(graph, self.settings)
+            if "radiance" not in loaded.outputs:
+                raise GraphError(f"{graph}: has no output 'radiance', which is held to the reference; add it")
+            other = hashes.setdefault(graph_hash(loaded), graph)
+            if other != graph:
+                raise SettingError(f"--graphs: {other} and {graph} are the same graph; leave one out")
+        if not self.shares():
+            total = len(self.graphs) * len(self.vpls) * self.seeds
+            raise SettingError(f"--shard {self.shard[0]}/{self.shard[1]}: is empty, there are {total} points in all")
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Parameters of passes from the scene file."""
+        return chosen_settings(self.scene.render, {}, None)
+
+    def key(self, graph: str, vpls: int, seed: int) -> Key:
+        """What the point depends on."""
+        made = load_graph(graph, {**self.settings, "vpl.count": vpls})
+        return Key(self.scene.hash, graph_hash(made), list(self.size), vpls, seed)
+
+    def shares(self) -> list[tuple[str, int, int]]:
+        """(graph, VPLs, seed) of the points of this shard."""
+        everything = [(g, n, s) for g in self.graphs for n in self.vpls for s in range(self.seeds)]
+        part, parts = self.shard
+        return everything[part - 1 :: parts]
+
+
+def run(sweep: Sweep, folder: Path, reference: Path | None) -> list[Point]:
+    """Measure what is not in `folder` yet; all points of the sweep's shard."""
+    truth = sweep_reference.given(reference, sweep.scene, sweep.size) if reference else None
+    points.make_folder(folder)
+    gpu = Gpu(sweep.device)
+    device = gpu.device.name
+    gpu.close()
+    if truth is None:
+        deciding = {
+            "graphs": [sweep.key(graph, max(sweep.vpls), 0).graph_hash for graph in sweep.graphs],
+            "device": device,
+        }
+        with _bars() as bar:
+            truth = sweep_reference.made(
+                folder, sweep.scene, sweep.size, deciding, images=lambda: _probes(sweep), progress=bar
+            )
+    done, ahead = dict[str, Point](), list[tuple[str, int, int]]()
+    truth_hash = truth.hash
+    for share in sweep.shares():
+        name = sweep.key(*share).name
+        point = points.read(folder, name)
+        if point and point.reference == truth_hash and point.device == device:
+            done[name] = points.renamed(point, share[0])
+        else:
+            ahead.append(share)
+    if done:
+        print(f"{len(done)} of {len(done) + len(ahead)} points are there already", file=sys.stderr)
+    for point in _measured(sweep, folder, truth, ahead):
+        done[point.key.name] = point
+    return points.ordered(done.values())
+
+
+def _measured(sweep: Sweep, folder: Path, truth: Truth, ahead: Sequence[tuple[str, int, int]]) -> Iterator[Point]:
+    """Measure and keep the points `ahead`, with a bar on a terminal."""
+    from tqdm import tqdm
+
+    flip_parameters = FlipParameters.of(truth.radiance)
+    total = sum(vpls + OVERHEAD for _, vpls, _ in ahead)
+    style = "{desc} {percentage:3.0f}%|{bar}| {elapsed}, {remaining} left"
+    with tqdm(total=total, bar_format=style, disable=not sys.stderr.isatty(), file=sys.stderr) as bar:
+        for graph in dict.fromkeys(graph for graph, _, _ in ahead):
+            with Renderer(sweep.size, graph, sweep.device, set=sweep.settings) as renderer:
+                for _, vpls, seed in (share for share in ahead if share[0] == graph):
+                    bar.set_description(f"{graph}, {vpls} VPLs, seed {seed}")
+                    key = sweep.key(graph, vpls, seed)
+                    yield _measure(
+                        sweep, folder, renderer, truth, flip_parameters=flip_parameters, key=key, graph=graph
+                    )
+                    bar.update(vpls + OVERHEAD)
+
+
+def _measure(
+    sweep: Sweep,
+    folder: Path,
+    renderer: Renderer,
+    truth: Truth,
+    *,
+    flip_parameters: FlipParameters,
+    key: Key,
+    graph: str,
+) -> Point:
+    scene = sweep.scene
+    images = [name for name in renderer.graph(key.vpls).outputs if name in IMAGES]
+    plan = renderer.plan(scene, key.vpls, images)
+    record = Record()
+    renderer.draw(scene, plan, seed=key.seed)  # compiles, allocates: not what a frame costs
+    for _ in range(FRAMES):
+        renderer.draw(scene, plan, seed=key.seed, record=record)
+    image = renderer.read(plan)
+    renderer.finish(record)
+    names = (f"{graph}, {key.vpls} VPLs, seed {key.seed}", "the reference")
+    result = compare(image.radiance, truth.radiance, truth.hit, names=names, flip_parameters=flip_parameters)
+    pictures = key.seed == 0 and image.display is not None
+    if pictures:
+        display, error = (points.path(folder, key.name, suffix) for suffix in points.PICTURES)
+        image.save(display)
+        errors = difference.signed_error(image.radiance, truth.radiance, result.reference_mean)
+        difference.save(error, errors)
+    point = Point(
+        key=key,
+        scene=scene.name,
+        graph=graph,
+        reference=truth.hash,
+        reference_noise=truth.noise,
+        device=renderer.gpu.device.name,
+        software=renderer.gpu.device.kind == "software",
+        vpls_alive=record.counters[-1].get("vpls_alive", 0),
+        frames=[round(ms, 4) for ms in record.frame_ms],
+        laps=[[(name, round(gpu, 4), round(cpu, 4)) for name, (gpu, cpu) in laps.items()] for laps in record.laps],
+        memory=renderer.memory(),
+        left_out=dict(plan.left_out),
+        relmse=result.relmse,
+        relmse_untrimmed=result.relmse_untrimmed,
+        bias=result.bias,
+        flip=result.flip,
+        flip_note=result.flip_note,
+        flip_parameters=asdict(flip_parameters) if result.flip is not None else None,
+        pictures=pictures,
+    )
+    points.save(folder, point)
+    return point
+
+
+def _probes(sweep: Sweep) -> list[Array]:
+    """An image of each graph with the most VPLs. The same in all shards, which so agree on a reference."""
+    images = []
+    for graph in sweep.graphs:
+        with Renderer(sweep.size, graph, sweep.device, set=sweep.settings) as renderer:
+            plan = renderer.plan(sweep.scene, max(sweep.vpls), ["radiance"])
+            renderer.draw(sweep.scene, plan)
+            images.append(renderer.read(plan).radiance)
+    return images
+
+
+@contextmanager
+def _bars() -> Iterator[Callable[[int], Progress]]:
+    """Progress bars on a terminal, one for each image that is traced."""
+    from tqdm import tqdm
+
+    bars: list[Any] = []
+
+    def begin(spp: int) -> Progress:
+        for bar in bars:
+            bar.close()
+        bars.append(tqdm(desc=f"reference, {spp} paths", disable=not sys.stderr.isatty(), file=sys.stderr))
+
+        def progress(done: int, total: int) -> None:
+            bars[-1].total = total
+            bars[-1].update(done - bars[-1].n)
+
+        return progress
+
+    try:
+        yield begin
+    finally:
+        for bar in bars:
+            bar.close()

@@ -106,6 +106,9 @@ def _parser() -> Parser:
         help="vpl.fov, vpl.clamp or vpl.pattern as in a render; may be repeated",
     )
 
+    profile = command("profile", _profile, "Measure error against run time: graphs x numbers of VPLs x seeds.")
+    _add_profile_options(profile)
+
     graph = command("graph", _graph, "Show what a render graph runs, in what order, and what it leaves out.")
     graph.add_argument("graph", metavar="NAME|FILE", help="a built-in graph or a graph file")
     graph.add_argument("--scene", metavar="SCENE", help="plan for this scene")
@@ -118,6 +121,19 @@ def _parser() -> Parser:
     doctor.add_argument("--device", default="auto", metavar="D", help="the device to check (default: auto)")
     command("devices", _devices, "List the devices that OpenGL can run on.")
     return parser
+
+
+def _add_profile_options(profile: Parser) -> None:
+    profile.add_argument("scene", nargs="?", metavar="SCENE", help="a built-in scene, a scene file (.toml) or a model")
+    profile.add_argument("--merge", nargs="+", metavar="DIR", help="instead: join the points of these folders")
+    profile.add_argument("-o", "--output", required=True, metavar="DIR", help="folder for points, tables and report")
+    profile.add_argument("--graphs", metavar="A,B", help="names or files (default: all built-in graphs)")
+    profile.add_argument("--vpls", metavar="N,N", help="numbers of virtual point lights (default: 16,64,256)")
+    profile.add_argument("--seeds", type=_count, metavar="K", help="seeds 0 to K-1 (default: 3)")
+    profile.add_argument("--size", metavar="WxH", help="pixels (default: 512x512)")
+    profile.add_argument("--reference", metavar="R.npy", help="with R.json beside it (default: one is traced)")
+    profile.add_argument("--shard", metavar="I/N", help="measure the I-th of N parts only")
+    profile.add_argument("--device", default="auto", metavar="D", help="see `deferred-ir devices` (default: auto)")
 
 
 def _count(text: str) -> int:
@@ -163,6 +179,12 @@ def _reference(arguments: argparse.Namespace) -> int:
     from .reference_command import reference
 
     return reference(arguments, settings(arguments.set))
+
+
+def _profile(arguments: argparse.Namespace) -> int:
+    from .profile_command import run
+
+    return run(arguments)
 
 
 def _graph(arguments: argparse.Namespace) -> int:

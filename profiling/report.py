@@ -7,7 +7,7 @@ import csv
 import io
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from statistics import mean, median, quantiles
@@ -24,6 +24,8 @@ from .sweep_reference import SHARE
 BUDGET = 50.0
 """Milliseconds for which the page gives advice."""
 NOISY = "reference_noise"
+SAME = 0.01
+"""Relative difference of errors below which a slower choice is not on the Pareto front."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ def write_all(folder: Path, found: Sequence[Point]) -> str:
         "devices": sorted({point.device for point in found}),
         "flip_parameters": first.flip_parameters,
     }
-    write(folder / "error_vs_time.json", {**about, "rows": rows, "groups": [vars(group) for group in groups]})
+    write(folder / "error_vs_time.json", {**about, "rows": rows, "groups": [asdict(group) for group in groups]})
     plot = svg(groups, first.scene)
     _write_text(folder / "error_vs_time.svg", plot)
     write(folder / "trace.json", trace(found))
@@ -91,12 +93,14 @@ def grouped(found: Iterable[Point]) -> list[Group]:
         time = round(mean(point.frame_ms for point in many), 4)
         noisy = any(flagged(point) for point in many)
         groups.append(Group(graph, vpls, len(many), time, mean(errors), min(errors), max(errors), noisy))
-    return [Group(**{**vars(group), "pareto": not any(_beats(other, group) for other in groups)}) for group in groups]
+    return [replace(group, pareto=not any(_beats(other, group) for other in groups)) for group in groups]
 
 
 def _beats(other: Group, group: Group) -> bool:
-    no_worse = other.frame_ms <= group.frame_ms and other.relmse <= group.relmse
-    return no_worse and (other.frame_ms, other.relmse) != (group.frame_ms, group.relmse)
+    """Faster and not worse, or as fast and better. Graphs of the same lights differ by roundings, which are no gain."""
+    if other.frame_ms == group.frame_ms:
+        return other.relmse < group.relmse
+    return other.frame_ms < group.frame_ms and other.relmse <= (1 + SAME) * group.relmse
 
 
 def advise(groups: Sequence[Group], budget: float = BUDGET) -> str:
@@ -202,6 +206,7 @@ def svg(groups: Sequence[Group], title: str) -> str:
     front = sorted((group for group in groups if group.pareto), key=lambda group: group.frame_ms)
     style: dict[str, Any] = {"color": "black", "lw": 0.8, "ls": ":", "marker": "o", "mfc": "none", "ms": 10}
     panel.plot([group.frame_ms for group in front], [group.relmse for group in front], label="Pareto front", **style)
+    panel.margins(0.08)
     panel.set_xscale("log")
     panel.set_yscale("log")
     panel.set_xlabel("frame time [ms]")

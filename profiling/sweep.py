@@ -50,7 +50,7 @@ class Sweep:
                 raise SettingError(f"{name}: leaves nothing to measure; name one at least")
         hashes: dict[str, str] = {}
         for graph in self.graphs:
-            loaded = load_graph(graph, self.settings)
+            loaded = load_graph(graph, {**self.settings, "vpl.count": max(self.vpls)})
             if "radiance" not in loaded.outputs:
                 raise GraphError(f"{graph}: has no output 'radiance', which is held to the reference; add it")
             other = hashes.setdefault(graph_hash(loaded), graph)
@@ -80,10 +80,10 @@ class Sweep:
 def run(sweep: Sweep, folder: Path, reference: Path | None) -> list[Point]:
     """Measure what is not in `folder` yet; all points of the sweep's shard."""
     truth = sweep_reference.given(reference, sweep.scene, sweep.size) if reference else None
-    points.make_folder(folder)
     gpu = Gpu(sweep.device)
     device = gpu.device.name
     gpu.close()
+    points.make_folder(folder)
     if truth is None:
         deciding = {
             "graphs": [sweep.key(graph, max(sweep.vpls), 0).graph_hash for graph in sweep.graphs],

@@ -39,9 +39,8 @@ def save(path: Path, errors: Array) -> None:
 
     height, width = errors.shape
     wide = max(width, NARROWEST)
-    picture = np.full((height + LEGEND, wide, 3), 128, np.uint8)
+    picture = np.full((height + LEGEND, wide, 3), 255, np.uint8)
     picture[:height, :width] = false_colour(errors)
-    picture[height:] = 255
     bar = np.linspace(-1.0, 1.0, wide - 16)
     picture[height + 4 : height + 16, 8:-8] = false_colour(bar)
     canvas = Image.fromarray(picture)

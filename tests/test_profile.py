@@ -268,6 +268,8 @@ def test_the_pareto_front_is_what_nothing_faster_reaches(whole):
 def test_the_advice_is_the_best_that_is_fast_enough():
     groups = [group("a", 16, 10, 0.1), group("a", 64, 49, 0.02), group("b", 64, 45, 0.05), group("a", 256, 90, 0.01)]
     assert report.advise(groups) == "For 50 ms: a, 64 VPLs, relMSE 0.02 in 49 ms."
+    equal = [group("slow", 64, 45, 0.02), group("fast", 64, 20, 0.0201)]
+    assert "fast" in report.advise(equal)
     assert report.advise(groups, 5).startswith("Nothing here takes 5 ms or less; the fastest: a, 16 VPLs")
     assert "noise" in report.advise([group("a", 16, 10, 0.1, True)])
 

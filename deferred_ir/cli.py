@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import threading
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
@@ -26,11 +25,10 @@ class Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status."""
     arguments = _parser().parse_args(argv)
-    if threading.current_thread() is threading.main_thread():
-        interrupts.install()
     try:
-        status: int = arguments.run(arguments)
-        sys.stdout.flush()
+        with interrupts.patient():
+            status: int = arguments.run(arguments)
+            sys.stdout.flush()
         return status
     except Error as error:
         print(f"deferred-ir: {error}", file=sys.stderr)

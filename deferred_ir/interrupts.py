@@ -8,7 +8,10 @@ this package's own code, or a wait for threads, is at the top of the stack.
 from __future__ import annotations
 
 import signal
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import FrameType
 
 RETRY = 0.02
@@ -47,10 +50,28 @@ def _safe(frame: FrameType | None) -> bool:
     return frame is not None and str(frame.f_globals.get("__name__")).startswith(_SAFE)
 
 
-def install() -> None:
-    """Let SIGINT wait for a good moment; where there are no timers to ask again (Windows), all stays as it is."""
-    if not hasattr(signal, "setitimer") or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+@contextmanager
+def patient() -> Iterator[None]:
+    """Let SIGINT wait for a good moment inside; afterwards the handlers are as they were.
+
+    Nothing changes outside the main thread, where there are no timers to ask again (Windows), and where somebody else
+    handles SIGINT.
+    """
+    main = threading.current_thread() is threading.main_thread()
+    if (
+        not main
+        or not hasattr(signal, "setitimer")
+        or signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    ):
+        yield
         return
     handler = _Handler()
-    signal.signal(signal.SIGINT, handler)
-    signal.signal(signal.SIGALRM, handler)
+    before = {number: signal.signal(number, handler) for number in (signal.SIGINT, signal.SIGALRM)}
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        for number, old in before.items():
+            signal.signal(number, old)
+    if handler.asked is not None:  # it was still waiting
+        raise KeyboardInterrupt

@@ -15,10 +15,10 @@ except BaseException:
 MAIN = """
 import sys, time
 from deferred_ir import interrupts
-interrupts.install()
 try:
-    import greedy
-    time.sleep(30)
+    with interrupts.patient():
+        import greedy
+        time.sleep(30)
 except KeyboardInterrupt:
     print("interrupted, with the module whole:", not greedy.swallowed, flush=True)
 """
@@ -34,8 +34,9 @@ def test_an_interrupt_during_an_import_waits_for_its_end(tmp_path):
 
 def test_outside_imports_it_comes_at_once():
     code = (
-        "import os, signal; from deferred_ir import interrupts; interrupts.install()\n"
-        "try: os.kill(os.getpid(), signal.SIGINT)\n"
+        "import os, signal; from deferred_ir import interrupts\n"
+        "try:\n"
+        "    with interrupts.patient(): os.kill(os.getpid(), signal.SIGINT)\n"
         "except KeyboardInterrupt: print('at once')"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=25)
@@ -44,16 +45,32 @@ def test_outside_imports_it_comes_at_once():
 
 def test_a_library_that_is_at_work_is_not_torn_apart():
     code = (
-        "import os, signal, sys; from deferred_ir import interrupts; interrupts.install()\n"
+        "import os, signal, sys; from deferred_ir import interrupts\n"
         "library = {'__name__': 'library', 'os': os, 'signal': signal}\n"
         "exec('''def work():\n"
         "    os.kill(os.getpid(), signal.SIGINT)\n"
         "    return sum(1 for _ in range(100000))''', library)\n"
         "done = None\n"
         "try:\n"
-        "    done = library['work']()\n"
-        "    while True: pass\n"
+        "    with interrupts.patient():\n"
+        "        done = library['work']()\n"
+        "        while True: pass\n"
         "except KeyboardInterrupt: print('worked', done)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=25)
     assert done.stdout == "worked 100000\n", done.stderr
+
+
+def test_handlers_are_given_back_and_no_interrupt_is_lost_on_the_way():
+    code = (
+        "import os, signal; from deferred_ir import interrupts\n"
+        "before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGALRM)\n"
+        "library = {'__name__': 'library', 'os': os, 'signal': signal}\n"
+        "exec('def work(): os.kill(os.getpid(), signal.SIGINT)', library)\n"
+        "try:\n"
+        "    with interrupts.patient(): library['work']()\n"
+        "except KeyboardInterrupt: print('interrupted')\n"
+        "print((signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGALRM)) == before)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=25)
+    assert done.stdout == "interrupted\nTrue\n", done.stderr

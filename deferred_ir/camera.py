@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from pyglm import glm
@@ -42,6 +43,7 @@ class Camera:
     fov: float = 60.0
     motion: CameraMotion | None = None
 
+    @cached_property
     def axes(self) -> Array:
         """Rows: right, up and forward, orthonormal, float64 (3, 3)."""
         # Three numbers each: given one tuple, PyGLM reads it in single precision.
@@ -57,7 +59,7 @@ class Camera:
         """
         width, height = size
         tangent = np.tan(np.radians(self.fov) / 2)
-        axes: Array = self.axes() * np.array([[tangent * width / height], [tangent], [1.0]])
+        axes: Array = self.axes * np.array([[tangent * width / height], [tangent], [1.0]])
         return axes
 
     def rays(self, size: tuple[int, int]) -> Array:

@@ -136,7 +136,7 @@ def _middle(tracer: Tracer) -> Array | None:
 
 def _seen_middle(tracer: Tracer, camera: Camera) -> Array | None:
     """The point half way to what a given camera looks at, or None where that is not inside a room."""
-    position, forward = np.array(camera.position), camera.axes()[2]
+    position, forward = np.array(camera.position), camera.axes[2]
     way, _ = _distances(tracer, position[None], forward[None])
     if not np.isfinite(way[0]):
         return None
@@ -186,7 +186,7 @@ def _outside_camera(scene: Scene) -> Camera:
 
 def _room_lights(tracer: Tracer, camera: Camera, middle: Array) -> list[Spotlight]:
     """Lights at several places in the air, looking down and a little along the camera's view."""
-    position, forward = np.array(camera.position), camera.axes()[2]
+    position, forward = np.array(camera.position), camera.axes[2]
     way = _free_way(tracer, position, forward[None])[0]
     grounds = [middle, *(position + forward * way * part for part in (0.25, 0.5, 0.75))]
     aim = _unit(0.3 * forward - UP) if abs(forward[1]) < 0.99 else -UP

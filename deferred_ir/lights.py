@@ -7,6 +7,7 @@ I(w) = E_i cos(theta_y) inside a round cone.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -49,7 +50,7 @@ class Spotlight:
     radius: float = 0.0
     motion: SpotlightMotion | None = None
 
-    @property
+    @cached_property
     def axis(self) -> Array:
         """Unit direction in which it looks, float64 (3,)."""
         axis = np.subtract(self.look_at, self.position).astype(np.float64)
@@ -78,12 +79,14 @@ def one_minus_cos(fov: float) -> float:
 
 def frames(axes: Array) -> tuple[Array, Array]:
     """Right and up vectors that make right-handed orthonormal frames with unit `axes` (..., 3) (Duff et al. 2017)."""
-    x, y, z = np.moveaxis(np.asarray(axes, dtype=np.float64), -1, 0)
+    axes = np.asarray(axes, dtype=np.float64)
+    x, y, z = axes[..., 0], axes[..., 1], axes[..., 2]
     sign = np.where(z < 0, -1.0, 1.0)
     a = -1.0 / (sign + z)
     b = x * y * a
-    right = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=-1)
-    up = np.stack([b, sign + y * y * a, -y], axis=-1)
+    right, up = np.empty_like(axes), np.empty_like(axes)
+    right[..., 0], right[..., 1], right[..., 2] = 1 + sign * x * x * a, sign * b, -sign * x
+    up[..., 0], up[..., 1], up[..., 2] = b, sign + y * y * a, -y
     return right, up
 
 

@@ -27,6 +27,14 @@ def unit_square(pattern: Pattern, count: int, seed: int) -> Array:
     return points
 
 
+@lru_cache(maxsize=64)
+def unit_disc(pattern: Pattern, count: int, seed: int) -> Array:
+    """`unit_square` mapped to the unit disc. Read-only: it is cached, for frames that repeat a seed."""
+    points = disc(unit_square(pattern, count, seed))
+    points.flags.writeable = False
+    return points
+
+
 def warn_unbalanced(pattern: Pattern, count: int) -> None:
     """Say that `count` points of a Sobol set are not balanced, unless it is a power of two."""
     if pattern == "sobol" and count & (count - 1):

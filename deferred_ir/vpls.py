@@ -18,7 +18,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from .lights import Spotlight, frames
-from .sampling import Pattern, disc, unit_square
+from .sampling import Pattern, disc, unit_disc, unit_square
 from .tracing import Tracer
 from .typing import Array, Ints
 
@@ -80,11 +80,11 @@ def cast(
 
 def _leave(light: Spotlight, count: int, pattern: Pattern, seed: int) -> tuple[Array, Array]:
     """Where the rays of the first bounce start, and their unit directions."""
-    points = disc(unit_square(pattern, count, seed)) * np.sin(np.radians(light.fov) / 2)
-    right, up = frames(light.axis)
+    points = unit_disc(pattern, count, seed) * np.sin(np.radians(light.fov) / 2)
     origins = np.broadcast_to(np.asarray(light.position, float), (count, 3))
     if light.radius > 0:
         on_disc = disc(np.random.default_rng([seed, 0]).permutation(unit_square(pattern, count, seed + 104729)))
+        right, up = frames(light.axis)
         origins = origins + light.radius * (on_disc[:, :1] * right + on_disc[:, 1:] * up)
     return origins, lift_to_hemisphere(points, light.axis[None])
 

@@ -17,7 +17,7 @@ POINTS = st.tuples(*[st.floats(-100, 100)] * 3)
 
 
 def test_the_axes_of_a_camera_that_looks_along_minus_z():
-    np.testing.assert_allclose(Camera((0, 0, 5), (0, 0, 0)).axes(), [[1, 0, 0], [0, 1, 0], [0, 0, -1]], atol=1e-15)
+    np.testing.assert_allclose(Camera((0, 0, 5), (0, 0, 0)).axes, [[1, 0, 0], [0, 1, 0], [0, 0, -1]], atol=1e-15)
 
 
 @given(POINTS, POINTS, POINTS)
@@ -25,7 +25,7 @@ def test_axes_are_orthonormal_and_right_handed(position, look_at, up):
     view = np.subtract(look_at, position)
     if np.linalg.norm(np.cross(view, up)) < 1e-3 * max(1, np.linalg.norm(view) * np.linalg.norm(up)):
         return  # up lies along the view: no camera
-    right, upward, forward = axes = Camera(position, look_at, up).axes()
+    right, upward, forward = axes = Camera(position, look_at, up).axes
     assert axes.dtype == np.float64
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-10)
     np.testing.assert_allclose(np.cross(right, upward), -forward, atol=1e-10)
@@ -39,7 +39,7 @@ def test_rays_go_through_the_pixel_centres_top_row_first(size):
     width, height = size
     rays = TILTED.rays(size)
     assert rays.shape == (height, width, 3)
-    right, up, forward = TILTED.axes()
+    right, up, forward = TILTED.axes
     tangent = math.tan(math.radians(TILTED.fov) / 2)
     for row in range(height):
         for column in range(width):
@@ -57,7 +57,7 @@ def test_the_field_of_view_is_vertical():
 
 
 def test_rays_have_view_depth_1():
-    np.testing.assert_allclose(TILTED.rays((5, 3)) @ TILTED.axes()[2], 1)
+    np.testing.assert_allclose(TILTED.rays((5, 3)) @ TILTED.axes[2], 1)
 
 
 def test_ray_axes_span_the_rays():

@@ -94,7 +94,7 @@ def test_a_room_with_an_open_side_is_seen_from_inside(tmp_path: Path) -> None:
 def test_an_object_is_seen_whole_from_outside(tmp_path: Path, mesh: trimesh.Trimesh) -> None:
     scene = load(tmp_path, mesh)
     assert scene.chosen["camera"]["why"] == "from outside, framing the whole"
-    right, up, forward = scene.camera.axes()
+    right, up, forward = scene.camera.axes
     ways = scene.geometry.positions - np.array(scene.camera.position)
     tangents = np.abs(np.stack([ways @ right, ways @ up])) / (ways @ forward)
     assert (ways @ forward > 0).all()

@@ -178,7 +178,7 @@ def test_units_of_length_do_not_matter(scale):
 def test_rays_on_the_very_rim_of_a_half_space_are_fine(monkeypatch):
     """sin^2 + cos^2 may round to more than 1."""
     rim = np.column_stack([np.zeros(100_000), np.linspace(0, 1, 100_000)])
-    monkeypatch.setattr(vpls, "unit_square", lambda *_: rim)
+    monkeypatch.setattr(vpls, "unit_disc", lambda *_: disc(rim))
     lights = cast(replace(LIGHT, fov=np.nextafter(180, 0)), Tracer(CLOSED), len(rim))
     assert np.isfinite(lights.emission).all()
 

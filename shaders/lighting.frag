@@ -2,13 +2,7 @@
 #include "lib/frame.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/light.glsl"
-#if HAS_SHADOWS
-#include "lib/atlas.glsl"
-layout(binding = UNIT_SHADOWS) uniform sampler2DArrayShadow shadows;
-#define VISIBILITY(light, kind) atlas_visibility(shadows, light, kind##_SIZE, kind##_OFFSET, position, normal)
-#else
-#define VISIBILITY(light, kind) 1.0
-#endif
+#include "lib/visibility.glsl"
 
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;

@@ -1,0 +1,86 @@
+"""Mitsuba 3's path tracer on the CPU, with the scene and the light of docs/conventions.md.
+
+The spotlight is Mitsuba's `spot`, with cos(theta) cone(theta) as the texture that it projects. What it cannot have: a
+light with a radius, a cone too wide for that texture, and vertex colours that vary over an image texture.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+import time
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.errors import SettingError
+from deferred_ir.scene import Scene
+from deferred_ir.typing import Array
+
+from . import Rendered
+
+INSTALL = "mitsuba"
+
+VARIANTS = ("llvm_ad_rgb", "scalar_rgb")
+"""The fastest first. Without CUDA: peers run on the CPU, all of them."""
+PROBE = """
+import sys, mitsuba, numpy
+mitsuba.set_variant(sys.argv[1])
+scene = mitsuba.load_dict({**mitsuba.cornell_box(), "integrator": {"type": "path", "max_depth": 3}})
+sys.exit(not numpy.isfinite(numpy.asarray(mitsuba.render(scene, spp=1))).all())
+"""
+"""LLVM aborts the process where it is too old for the kernels, so another process tries."""
+LANES = 1 << 24
+"""Paths at once: LLVM's variant keeps the state of all of them in memory."""
+SOON = 5000.0
+"""Milliseconds. An image of a new kernel that takes longer is not rendered again only to leave its compilation out."""
+
+
+def available() -> str | None:
+    """None if Mitsuba can be used here, else the reason why not."""
+    return None if importlib.util.find_spec("mitsuba") else "mitsuba is not installed"
+
+
+class Peer:
+    """Mitsuba with `scene` at time 0 loaded, for images of `size` (width, height)."""
+
+    about: str
+
+    def __init__(self, scene: Scene, size: tuple[int, int], bounces: int) -> None:
+        import mitsuba
+
+        from . import mitsuba_scene
+
+        self._mi: Any = mitsuba
+        variant = next((name for name in VARIANTS if _works(name)), None)
+        if variant is None:
+            raise SettingError(f"mitsuba: none of its variants {', '.join(VARIANTS)} works here; install it again")
+        mitsuba.set_variant(variant)
+        failed = "".join(f", {name} does not work here" for name in VARIANTS[: VARIANTS.index(variant)])
+        self.about = f"Mitsuba {mitsuba.__version__}, {variant}{failed}"
+        self._pixels = size[0] * size[1]
+        self._scene = mitsuba.load_dict(mitsuba_scene.description(mitsuba, scene.at(0.0), size, bounces))
+        self._warm: set[int] = set()
+
+    def render(self, spp: int, seed: int) -> Rendered:
+        """An image of `spp` paths a pixel, a power of two. `ms` leaves the compilation of kernels out."""
+        rendered = self._timed(spp, seed)
+        if spp not in self._warm and rendered.ms < SOON:
+            rendered = self._timed(spp, seed)
+        self._warm.add(spp)
+        return rendered
+
+    def _timed(self, spp: int, seed: int) -> Rendered:
+        at_once = min(spp, 1 << max(0, (LANES // self._pixels).bit_length() - 1))
+        start = time.perf_counter()
+        image: Array | float = 0.0
+        for part in range(spp // at_once):
+            made = self._mi.render(self._scene, spp=at_once, seed=seed * spp + part)
+            image = image + np.asarray(made, np.float64) / (spp // at_once)
+        return Rendered(np.asarray(image, np.float32), (time.perf_counter() - start) * 1e3)
+
+
+def _works(variant: str) -> bool:
+    command = [sys.executable, "-c", PROBE, variant]
+    return subprocess.run(command, check=False, capture_output=True, stdin=subprocess.DEVNULL).returncode == 0

@@ -1,8 +1,9 @@
 """Shadow maps of all lights in one depth texture array: lights -> atlas.
 
 One pass over all lights, for they are too many and too volatile for a node each. The spotlight owns layer 0, each VPL a
-tile on the layers behind it. The pass plans a sub-pass for each light and draws the dirty ones in one instanced call a
-block of lights: the vertex shader chooses layer and tile, four clip distances cut the tile out.
+tile on the layers behind it. The pass plans a sub-pass for each light and draws the dirty ones in one indirect call a
+block of lights, each cluster of triangles once for every light that may see it: the vertex shader chooses layer and
+tile, four clip distances cut the tile out.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ class ShadowMaps(Pass):
         return [{**tile, "state": "dirty", "why": why} for tile in [spot, *tiles]]
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Clear, then draw the scene once for each light."""
+        """Clear, then draw for each light what it may see."""
         gpu, lights = io.gpu, io["lights"]
         io.framebuffer.clear_depth()
         self.params.prepare(gpu)
@@ -65,11 +66,12 @@ class ShadowMaps(Pass):
             gpu.ctx.enable_direct(raw.CLIP_DISTANCE0 + side)
         geometry = None if gpu.layer_from_vertex else "shadow_maps.geom"
         program = io.program("depth.frag", "shadow_maps.vert", geometry)
-        program.set(first=0)
         total = len(lights.records)
+        clusters = frame.buffers.cluster_buffers.clusters
         for start in range(0, total, LIGHTS_PER_BLOCK):
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
-            frame.buffers.draw(program, instances=min(LIGHTS_PER_BLOCK, total - start))
+            visible = clusters.visible(lights.records[start : start + LIGHTS_PER_BLOCK])
+            frame.buffers.draw_clusters(program, visible)
         io.count("maps_drawn", total)
 
 

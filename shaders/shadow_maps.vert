@@ -4,7 +4,7 @@
 #endif
 #include "lib/atlas.glsl"
 
-uniform int first;  // light of this block that instance 0 draws
+in int light_index;  // in its block; one an instance
 in vec3 position;
 #if LAYER_FROM_VERTEX
 out float gl_ClipDistance[4];
@@ -17,7 +17,7 @@ flat out int layer;
 #endif
 
 void main() {
-    Light light = lights[first + gl_InstanceID];
+    Light light = lights[light_index];
     vec4 clip = light_clip(light, position);
     vec4 tile = atlas_tile(light);
     // The four sides of the map: the hardware clips at those of the whole layer only.

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from ..clusters import Clusters
 from ..errors import DeviceError
 from ..graph import Texture
 from ..materials import srgb_table
 from ..scene import Scene
+from ..typing import Bools
+from .cluster_buffers import ClusterBuffers
 from .gpu import Gpu
 from .resources import GpuTexture
 from .shaders import Program
@@ -24,7 +28,7 @@ class SceneBuffers:
     """Indexed triangles with what shaders read of each face. `defines` say which attributes there are."""
 
     def __init__(self, gpu: Gpu, scene: Scene) -> None:
-        self.gpu, g = gpu, scene.geometry
+        self.gpu, self._scene, g = gpu, scene, scene.geometry
         self.defines = {
             "HAS_NORMALS": int(g.normals is not None),
             "HAS_UVS": int(bool(scene.textures) and g.uvs is not None),
@@ -49,8 +53,19 @@ class SceneBuffers:
         self.face_count = len(g.faces)
         buffers = [*(buffer for buffer, _ in self._attributes.values()), self._indices, self._faces, self._materials]
         self._buffers = buffers
-        self.buffer_bytes = sum(buffer.size for buffer in buffers)
         self.texture_bytes = sum(texture.nbytes for texture in self._textures)
+
+    @property
+    def buffer_bytes(self) -> int:
+        """Bytes of all buffers, those of the clusters too once there are some."""
+        clusters = self.cluster_buffers.nbytes if "cluster_buffers" in self.__dict__ else 0
+        return sum(buffer.size for buffer in self._buffers) + clusters
+
+    @cached_property
+    def cluster_buffers(self) -> ClusterBuffers:
+        """The triangles in clusters, made when first drawn so."""
+        g = self._scene.geometry
+        return ClusterBuffers(self.gpu, Clusters(g.positions, g.faces), g.faces)
 
     def _upload(self, texture: Any) -> GpuTexture:
         height, width = texture.pixels.shape[:2]
@@ -90,8 +105,19 @@ class SceneBuffers:
             program.set(textured=texture is not None, first_face=first)
             array.render(self.gpu.ctx.TRIANGLES, vertices=3 * count, first=3 * first, instances=instances)
 
+    def draw_clusters(self, program: Program, visible: Bools) -> None:
+        """Draw each cluster of `cluster_buffers` for the lights that may see it: bool (lights, clusters).
+
+        The program reads `position` and `light_index`, the row of `visible`.
+        """
+        if self not in program.arrays:
+            program.arrays[self] = self.cluster_buffers.array(program, self._attributes["position"])
+        self.cluster_buffers.draw(program.arrays[self], visible)
+
     def release(self) -> None:
         """Give everything back. Vertex arrays that programs keep for this scene must go first."""
+        if "cluster_buffers" in self.__dict__:
+            self.cluster_buffers.release()
         for buffer in self._buffers:
             buffer.release()
         for texture in self._textures:

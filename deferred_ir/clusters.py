@@ -1,0 +1,75 @@
+"""Triangles in clusters with bounding boxes, and which of them each light's map may show. No OpenGL."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .typing import Array, Bools, Ints
+
+CLUSTER = 256
+"""Most triangles in a cluster."""
+ROUNDING = 2.0**-18
+"""Slack of the test against a plane, relative to the terms it adds: 64 roundings, this test's and the shader's."""
+
+
+class Clusters:
+    """Faces (F, 3) of `positions` (V, 3), grouped by where they are.
+
+    order: int (F,), the faces of cluster 0, then of cluster 1, ... starts: int (C + 1,), where in `order` each begins.
+    """
+
+    def __init__(self, positions: Array, faces: Ints, most: int = CLUSTER) -> None:
+        corners = positions.astype(np.float32)[faces]
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        self.order, self.starts = _split(low / 2 + high / 2, most)
+        first = self.starts[:-1]
+        low, high = np.minimum.reduceat(low[self.order], first), np.maximum.reduceat(high[self.order], first)
+        centre = low / 2 + high / 2
+        half = np.maximum(high - centre, centre - low)
+        self._reach = np.abs([low, high]).max()
+        self._boxes = np.concatenate([centre, half, np.ones((len(first), 1), np.float32)], axis=1).T.copy()
+
+    def __len__(self) -> int:
+        return len(self.starts) - 1
+
+    @property
+    def sizes(self) -> Ints:
+        """Triangles of each cluster, int (C,)."""
+        return np.diff(self.starts)
+
+    def visible(self, lights: np.ndarray, *, hemisphere: bool = False) -> Bools:
+        """Which clusters may show in the maps of `lights`, LIGHT records (n,): bool (n, C).
+
+        A map shows what lies inside its pyramid; with `hemisphere` all that is in front of the light. A cluster that is
+        left out lies outside by more than roundings can move it, so its triangles would have covered no texel.
+        """
+        if len(self) == 1:
+            return np.ones((len(lights), 1), bool)
+        x, y, z = (lights[axis] for axis in ("x_axis", "y_axis", "z_axis"))
+        position = lights["position"]
+        # What the dot products here and in the shader add up is no larger than this.
+        terms = (np.abs(x) + np.abs(y) + np.abs(z)).sum(axis=1) * (self._reach + np.abs(position).max(axis=1))
+        slack = terms * np.float32(ROUNDING)
+        outside = np.zeros((len(lights), len(self)), bool)
+        for normal in (z,) if hemisphere else (z, z + x, z - x, z + y, z - y):
+            offset = slack - (normal * position).sum(axis=1)
+            # The corner of the box that is farthest along the normal decides.
+            outside |= np.column_stack([normal, np.abs(normal), offset]) @ self._boxes < 0
+        return ~outside
+
+
+def _split(points: Array, most: int) -> tuple[Ints, Ints]:
+    """Halve `points` (n, 3) across their longest extent until no part has more than `most`: order (n,), starts."""
+    order, starts, ahead = np.arange(len(points)), [len(points)], [(0, len(points))]
+    while ahead:
+        start, end = ahead.pop()
+        if end - start <= most:
+            starts.append(start)
+            continue
+        part = points[order[start:end]]
+        # Whole clusters on the left: then all but the last are full.
+        middle = -(-(end - start) // (2 * most)) * most
+        axis = np.ptp(part, axis=0).argmax()
+        order[start:end] = order[start:end][np.argpartition(part[:, axis], middle - 1)]
+        ahead += [(start, start + middle), (start + middle, end)]
+    return order, np.sort(starts)

@@ -1,0 +1,60 @@
+"""Clusters of triangles on the GPU, each drawn once for every light that may see it, all in one indirect call."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..clusters import Clusters
+from ..typing import Bools, Ints
+from .gpu import Gpu
+from .shaders import Program
+
+COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index", "base_vertex", "base_instance")])
+"""What glMultiDrawElementsIndirect reads of each draw."""
+
+
+class ClusterBuffers:
+    """Indices of `faces` (F, 3) in the order of `clusters`, and what a call draws of them."""
+
+    def __init__(self, gpu: Gpu, clusters: Clusters, faces: Ints) -> None:
+        self.gpu, self.clusters = gpu, clusters
+        self._indices = gpu.ctx.buffer(np.ascontiguousarray(faces[clusters.order], "u4").tobytes())
+        self._lights = gpu.ctx.buffer(reserve=4, dynamic=True)
+        self._commands = gpu.ctx.buffer(reserve=len(clusters) * COMMAND.itemsize, dynamic=True)
+        self._each = np.zeros(len(clusters), COMMAND)
+        self._each["count"], self._each["first_index"] = 3 * clusters.sizes, 3 * clusters.starts[:-1]
+        gpu.gl.check(f"clusters of {len(faces)} triangles")
+
+    @property
+    def nbytes(self) -> int:
+        """Size of all buffers."""
+        return sum(buffer.size for buffer in (self._indices, self._lights, self._commands))
+
+    def array(self, program: Program, positions: tuple[Any, str]) -> Any:
+        """The vertex array of a program that reads `position` and `light_index`; positions: a buffer and its layout."""
+        # An instanced attribute counts from base_instance; gl_InstanceID does not.
+        attributes = [(*positions, "position"), (self._lights, "1i/i", "light_index")]
+        return self.gpu.ctx.vertex_array(program.glsl, attributes, self._indices, index_element_size=4)
+
+    def draw(self, array: Any, visible: Bools) -> None:
+        """Draw cluster c with light_index l wherever visible[l, c], bool (lights, clusters)."""
+        cluster, light = np.nonzero(visible.T)
+        instances = np.bincount(cluster, minlength=len(self.clusters))
+        commands = self._each.copy()
+        commands["instances"], commands["base_instance"] = instances, np.cumsum(instances) - instances
+        commands = commands[instances > 0]
+        if not len(commands):
+            return
+        if 4 * len(light) > self._lights.size:
+            self._lights.orphan(4 * len(light))
+            self.gpu.gl.check(f"drawing {len(light)} clusters")
+        self._lights.write(light.astype("i4").tobytes())
+        self._commands.write(commands.tobytes())
+        array.render_indirect(self._commands, self.gpu.ctx.TRIANGLES, count=len(commands))
+
+    def release(self) -> None:
+        """Give the buffers back."""
+        for buffer in (self._indices, self._lights, self._commands):
+            buffer.release()

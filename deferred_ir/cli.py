@@ -107,6 +107,9 @@ def _parser() -> Parser:
     profile = command("profile", _profile, "Measure error against run time: graphs x numbers of VPLs x seeds.")
     _add_profile_options(profile)
 
+    check = command("check", _check, "Measure whether the renderer can be relied on: so far, shadow maps against rays.")
+    _add_check_options(check)
+
     graph = command("graph", _graph, "Show what a render graph runs, in what order, and what it leaves out.")
     graph.add_argument("graph", metavar="NAME|FILE", help="a built-in graph or a graph file")
     graph.add_argument("--scene", metavar="SCENE", help="plan for this scene")
@@ -132,6 +135,22 @@ def _add_profile_options(profile: Parser) -> None:
     profile.add_argument("--reference", metavar="R.npy", help="with R.json beside it (default: one is traced)")
     profile.add_argument("--shard", metavar="I/N", help="measure the I-th of N parts only")
     profile.add_argument("--device", default="auto", metavar="D", help="see `deferred-ir devices` (default: auto)")
+
+
+def _add_check_options(check: Parser) -> None:
+    scene_help = "a built-in scene, a scene file (.toml) or a model (default: all built-in scenes)"
+    check.add_argument("scene", nargs="?", metavar="SCENE", help=scene_help)
+    check.add_argument(
+        "--visibility", action="store_true", help="shadow maps against rays (as all checks: runs if none is chosen)"
+    )
+    check.add_argument("--sizes", metavar="N,N", help="of VPLs' maps, texels (default: 256,512)")
+    check.add_argument("--pairs", type=_positive, metavar="N", help="of pixel and light, a row (default: 200000)")
+    check.add_argument("--size", metavar="WxH", help="pixels of a frame (default: 256x256)")
+    check.add_argument("--vpls", type=_count, metavar="N", help="virtual point lights of a frame (default: 64)")
+    check.add_argument("--seed", type=_count, metavar="N", help="of the samples (default: 0)")
+    check.add_argument("--device", default="auto", metavar="D", help="see `deferred-ir devices` (default: auto)")
+    check.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
+    check.add_argument("--json", metavar="F", help="write all figures")
 
 
 def _count(text: str) -> int:
@@ -183,6 +202,12 @@ def _profile(arguments: argparse.Namespace) -> int:
     from .profile_command import run
 
     return run(arguments)
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    from .check_command import run
+
+    return run(arguments, settings(arguments.set))
 
 
 def _graph(arguments: argparse.Namespace) -> int:

@@ -35,7 +35,7 @@ class VisibilityPairs(Pass):
         "lights": Input("the spotlight, then the VPLs", format="light"),
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
-        "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
+        "shadows": Input("shadow atlas", format="depth32f", linear=True, compare=">="),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:

@@ -1,0 +1,174 @@
+"""`deferred-ir check`: its table, its figures as JSON, and its faults."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from deferred_ir import check_command
+from deferred_ir.cli import main
+from deferred_ir.loading import builtin_scenes, load
+
+SMALL = ("--size", "32x32", "--vpls", "4", "--pairs", "100", "--device", "software")
+ONE = (*SMALL, "--set", "shadow_maps.spot_size=128", "--sizes", "32")
+SHARES = ["mismatch", "leaks", "false_shadows", "light_wrong", "light_leaked", "light_lost"]
+
+
+def checked(capsys, *arguments):
+    """The lines that a check prints."""
+    assert main(["check", *arguments]) == 0
+    return capsys.readouterr().out.splitlines()
+
+
+def fault(capsys, tmp_path, *arguments):
+    """The one line that a command complains with; no file may appear."""
+    try:
+        status = main(["check", *arguments])
+    except SystemExit as end:  # argparse's own
+        status = end.code
+    output = capsys.readouterr()
+    assert status == 2, output
+    assert output.out == ""
+    assert not list(tmp_path.iterdir())
+    (line,) = output.err.splitlines()
+    return line
+
+
+@pytest.fixture
+def small_scene(tmp_path):
+    """A scene file with a [render] table of its own."""
+
+    def write(render):
+        path = tmp_path / "scene.toml"
+        text = '[[model]]\npath = "MODEL"\n[render]\n' + render
+        path.write_text(text.replace("MODEL", str(load("cornell").path.with_name("cornell.obj"))))
+        return str(path)
+
+    return write
+
+
+def test_the_table_has_a_line_for_each_kind_of_light_and_size(capsys):
+    head, *lines = checked(capsys, "cornell", "--visibility", *SMALL, "--sizes", "16,32")
+    assert re.split(r"  +", head)[:4] == ["scene", "lights", "projection", "map"]
+    assert len({len(line) for line in [head, *lines]}) == 1
+    found = [re.split(r"  +", line) for line in lines]
+    assert [cells[3] for cells in found if cells[1:3] == ["vpls", "perspective"]] == ["16", "32"]
+    assert [cells[3] for cells in found if cells[1:3] == ["spotlight", "perspective"]] == ["2048"]
+    for cells in found:
+        assert cells[0] == "cornell"
+        assert int(cells[4].replace(",", "")) >= 100
+        assert all(re.fullmatch(r"\d+\.\d{3}( \+-\d\.\d{3})?", share) for share in cells[5:])
+        mismatch, leaks, false_shadows = (float(cell.split()[0]) for cell in cells[5:8])
+        assert mismatch == pytest.approx(leaks + false_shadows, abs=0.002)
+
+
+def test_json_holds_every_figure(capsys, tmp_path):
+    path = tmp_path / "f.json"
+    lines = checked(capsys, "cornell", "--visibility", *ONE, "--json", str(path))
+    told = json.loads(path.read_text())
+    assert list(told) == ["visibility"]
+    assert len(told["visibility"]) == len(lines) - 1
+    for row, line in zip(told["visibility"], lines[1:], strict=True):
+        assert row["scene_hash"] == load("cornell").hash
+        assert row["map_size"] == {"spotlight": 128, "vpls": 32}[row["lights"]]
+        assert (row["size"], row["vpls"], row["seed"]) == ([32, 32], 4, 0)
+        assert row["frames"] >= 8
+        assert "llvmpipe" in row["device"]
+        for name in SHARES:
+            assert set(row[name]) == {"value", "error"}
+            assert f" {100 * row[name]['value']:.3f}" in line
+        assert row["light_wrong"]["value"] == pytest.approx(row["light_leaked"]["value"] + row["light_lost"]["value"])
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_seed_gives_the_same_figures_again(capsys):
+    first, again, other = (checked(capsys, "cornell", *ONE, "--seed", seed) for seed in ("3", "3", "4"))
+    assert first == again
+    assert first != other
+
+
+def test_without_a_choice_all_checks_run_on_all_scenes(capsys):
+    """Visibility is all there is so far."""
+    lines = checked(capsys, *ONE)
+    assert {line.split()[0] for line in lines[1:]} == {name for name, _ in builtin_scenes()}
+    assert lines == checked(capsys, "--visibility", *ONE)
+
+
+def test_set_narrows_the_sizes(capsys):
+    lines = checked(capsys, "cornell", *SMALL, "--set", "shadow_maps.vpl_size=24")
+    assert {line.split()[3] for line in lines[1:] if "vpls" in line} == {"24"}
+
+
+def test_the_scene_file_has_a_say(capsys, small_scene):
+    """Its VPLs, its seed, and those of its parameters that the graph has."""
+    arguments = ["--size", "32x32", "--pairs", "100", "--device", "software", "--sizes", "32"]
+    render = (
+        'graph = "forward"\nvpls = 4\nseed = 3\nset = { "forward.lights_per_draw" = 2, "shadow_maps.spot_size" = 128 }'
+    )
+    assert checked(capsys, small_scene(render), *arguments) == checked(
+        capsys, small_scene(""), *arguments, "--vpls", "4", "--seed", "3", "--set", "shadow_maps.spot_size=128"
+    )
+
+
+def test_a_dark_light_is_told(capsys, monkeypatch, tmp_path):
+    scene = load("cornell")
+    dark = replace(scene, spotlight=replace(scene.spotlight, emission=(0.0, 0.0, 0.0)))
+    monkeypatch.setattr(check_command, "load", lambda _: dark)
+    assert main(["check", "cornell", *ONE, "--json", str(tmp_path / "f.json")]) == 0
+    output = capsys.readouterr()
+    assert output.err == "note: cornell: the spotlight emits nothing: no light that a map could be wrong about\n"
+    assert json.loads((tmp_path / "f.json").read_text()) == {"visibility": []}
+
+
+def test_few_pairs_are_told(capsys, monkeypatch):
+    monkeypatch.setattr("deferred_ir.profiling.visibility.MOST_FRAMES", 8)
+    assert main(["check", "cornell", *ONE, "--pairs", "1000000"]) == 0
+    notes = capsys.readouterr().err.splitlines()
+    assert re.fullmatch(r"note: cornell, spotlight: hardly a pixel faces a light: \d+ pairs, no more", notes[0])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nowhere"], "nowhere: no such file and no built-in scene of that name"),
+        (["cornell", "--pairs", "0"], "argument --pairs: '0' is no whole number from 1 up"),
+        (["cornell", "--sizes", "256,big"], "--sizes 256,big: 'big' is no whole number; write 256,512"),
+        (["cornell", "--sizes", "256,,512"], "--sizes 256,,512: '' is no whole number"),
+        (["cornell", "--sizes", "8"], "shadow_maps.vpl_size: is 8, but wants a whole number at least 16"),
+        (["cornell", "--sizes", "64", "--set", "shadow_maps.vpl_size=32"], "contradict each other; give one"),
+        (["cornell", "--size", "64"], "--size 64: wants WIDTHxHEIGHT"),
+        (["cornell", "--set", "shadow_maps.vpl_siez=64"], "no such parameter; did you mean 'vpl_size'?"),
+        (["cornell", "--set", "shadow_map.vpl_size=64"], "no pass 'shadow_map' in this graph"),
+        (["cornell", "--vpls", "4", "--set", "vpl.count=8"], "contradict each other; give one"),
+        (["cornell", "--json", "no/such/f.json"], "no/such/f.json: "),
+        (["cornell", "--device", "no such"], "no such"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_faults_are_one_line(capsys, tmp_path, monkeypatch, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    line = fault(capsys, tmp_path, *arguments)
+    assert line.startswith("deferred-ir")
+    assert message in line
+
+
+def test_ctrl_c_leaves_no_file(tmp_path):
+    """While the second of many rows is measured."""
+    arguments = [*ONE, "--pairs", "1000000", "--sizes", "32,33,34,35,36,37", "--json", str(tmp_path / "f.json")]
+    running = subprocess.Popen(
+        [sys.executable, "-m", "deferred_ir", "check", "cornell", *arguments],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert running.stdout.readline().startswith("scene")
+    running.send_signal(signal.SIGINT)
+    error = running.communicate(timeout=60)[1]
+    assert running.returncode == 130
+    assert error.splitlines()[-1] == "deferred-ir: interrupted"
+    assert "Traceback" not in error
+    assert not list(tmp_path.iterdir())

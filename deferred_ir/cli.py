@@ -134,6 +134,11 @@ def _add_profile_options(profile: Parser) -> None:
     profile.add_argument("--size", metavar="WxH", help="pixels (default: 512x512)")
     profile.add_argument("--reference", metavar="R.npy", help="with R.json beside it (default: one is traced)")
     profile.add_argument("--shard", metavar="I/N", help="measure the I-th of N parts only")
+    profile.add_argument(
+        "--peers",
+        metavar="A,B|none",
+        help="other renderers to compare: mitsuba, cycles (default: all that are installed)",
+    )
     profile.add_argument("--device", default="auto", metavar="D", help="see `deferred-ir devices` (default: auto)")
 
 

@@ -150,6 +150,16 @@ def relmse(image: Any, reference: Any, hit: Hit = None) -> tuple[float, float]:
     return _pair(image, reference, hit, NAMES).relmse()
 
 
+def masked_relmse(image: Any, reference: Any, kept: Bools) -> float | None:
+    """relMSE of the pixels `kept`, bool (H, W), as if there were no others: they give mean(R), and 0.1 % of them go.
+
+    None where nothing is kept, or nothing of it is lit in the reference.
+    """
+    if not np.asarray(reference)[kept].any():
+        return None
+    return relmse(image, reference, kept)[0]
+
+
 def rmse(image: Any, reference: Any, hit: Hit = None) -> float:
     """Root of the mean of (I - R)^2, in units of radiance."""
     return _pair(image, reference, hit, NAMES).rmse()

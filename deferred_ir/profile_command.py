@@ -24,31 +24,33 @@ def run(arguments: argparse.Namespace) -> int:
     report: Any = importlib.import_module(f"{ROOM}.report")
     report.check_libraries()
     folder = Path(arguments.output)
-    found = _merged(arguments, folder) if arguments.merge else _measured(arguments, folder)
-    print(report.write_all(folder, found))
+    found, peers = _merged(arguments, folder) if arguments.merge else _measured(arguments, folder)
+    print(report.write_all(folder, found, peers))
     print(folder / "report.html", file=sys.stderr)
     return 0
 
 
-def _measured(arguments: argparse.Namespace, folder: Path) -> list[Any]:
+def _measured(arguments: argparse.Namespace, folder: Path) -> tuple[list[Any], Any]:
+    """Points of the sweep, and what there is of peers."""
     if arguments.scene is None:
         raise SettingError("profile: wants a SCENE to measure, or --merge DIR...")
     sweep: Any = importlib.import_module(f"{ROOM}.sweep")
     counts = _counts(VPLS if arguments.vpls is None else arguments.vpls)
     shard = _shard(arguments.shard)
+    peers: Any = importlib.import_module(f"{ROOM}.peer_sweep").chosen(arguments.peers)
     graphs = graph_names() if arguments.graphs is None else _names(arguments.graphs)
     scene = load(arguments.scene)
     size = chosen_size(arguments.size, scene.render)
     seeds = SEEDS if arguments.seeds is None else arguments.seeds
-    what = sweep.Sweep(scene, size, graphs, counts, seeds, arguments.device, shard)
+    what = sweep.Sweep(scene, size, graphs, counts, seeds, arguments.device, shard, peers)
     for note in notes(scene):
         print(f"note: {note}", file=sys.stderr)
-    found: list[Any] = sweep.run(what, folder, Path(arguments.reference) if arguments.reference else None)
+    found: tuple[list[Any], Any] = sweep.run(what, folder, Path(arguments.reference) if arguments.reference else None)
     return found
 
 
-def _merged(arguments: argparse.Namespace, folder: Path) -> list[Any]:
-    given = ("graphs", "vpls", "seeds", "size", "reference", "shard", "scene")
+def _merged(arguments: argparse.Namespace, folder: Path) -> tuple[list[Any], Any]:
+    given = ("graphs", "vpls", "seeds", "size", "reference", "shard", "peers", "scene")
     extra = [name for name in given if getattr(arguments, name) is not None]
     if extra:
         what = "a SCENE" if extra[0] == "scene" else f"--{extra[0]}"
@@ -56,12 +58,11 @@ def _merged(arguments: argparse.Namespace, folder: Path) -> list[Any]:
     for name in arguments.merge:
         if not Path(name).is_dir():
             raise OutputError(f"{name}: is no folder; --merge joins folders that profile wrote")
-    points: Any = importlib.import_module(f"{ROOM}.points")
-    found: list[Any]
-    found, broken = points.merge([Path(name) for name in arguments.merge], folder)
+    shards: Any = importlib.import_module(f"{ROOM}.shards")
+    found, peers, broken = shards.merge([Path(name) for name in arguments.merge], folder)
     if broken:
         print(f"note: {broken} points were unusable and left out; run their shard again", file=sys.stderr)
-    return found
+    return found, peers
 
 
 def _names(text: str) -> list[str]:

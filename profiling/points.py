@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from statistics import median
 from typing import Any
 
-from deferred_ir.errors import OutputError, SettingError
+from deferred_ir.errors import OutputError
 from deferred_ir.image import write_whole
 from deferred_ir.run_record import write
 
@@ -42,7 +42,8 @@ class Point:
 
     reference: hash of the reference image; reference_noise: its own relMSE, None where it is unknown. device:
     GL_RENDERER; software: it is a driver without a GPU. frames: wall time of each recorded frame. laps: for each frame
-    (pass, GPU, CPU) in the order in which they ran. pictures: the files of PICTURES lie beside it.
+    (pass, GPU, CPU) in the order in which they ran. relmse_masked: of the pixels without an edge, None where there
+    is no such pixel. pictures: the files of PICTURES lie beside it.
     """
 
     key: Key
@@ -60,6 +61,7 @@ class Point:
     relmse: float
     relmse_untrimmed: float
     bias: float
+    relmse_masked: float | None
     flip: float | None
     flip_note: str | None
     flip_parameters: dict[str, Any] | None
@@ -104,57 +106,6 @@ def make_folder(folder: Path) -> None:
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise OutputError(f"{folder}: cannot be written: {why}; choose another folder") from error
-
-
-def merge(sources: Sequence[Path], target: Path) -> tuple[list[Point], int]:
-    """Copy the points of several output folders to `target`; the points, sorted, and how many files were unusable.
-
-    Raises SettingError where folders hold no points, or points of several scenes, sizes or references.
-    """
-    found: dict[str, tuple[Path, Point]] = {}
-    broken = 0
-    for source in sources:
-        names = [file.stem for file in sorted((source / FOLDER).glob("*.json"))]
-        read_here = {name: read(source, name) for name in names}
-        broken += sum(point is None for point in read_here.values())
-        points = {name: point for name, point in read_here.items() if point}
-        if not points:
-            raise SettingError(f"{source}: holds no points of a sweep; give folders that profile wrote")
-        for name, point in points.items():
-            _same(found, source, point)
-            found.setdefault(name, (source, point))
-    make_folder(target)
-    for name, (source, point) in found.items():
-        if source.resolve() == target.resolve():
-            continue
-        for suffix in PICTURES if point.pictures else ():
-            _copy(path(source, name, suffix), path(target, name, suffix))
-        save(target, point)
-    return ordered(point for _, point in found.values()), broken
-
-
-def _same(found: dict[str, tuple[Path, Point]], source: Path, point: Point) -> None:
-    if not found:
-        return
-    other, first = next(iter(found.values()))
-    for what, ours, theirs in (
-        ("scene", (point.scene, point.key.scene_hash), (first.scene, first.key.scene_hash)),
-        ("size", tuple(point.key.size), tuple(first.key.size)),
-        ("reference", (point.reference,), (first.reference,)),
-    ):
-        if ours != theirs:
-            told = [" ".join(map(str, values)) for values in (ours, theirs)]
-            mend = "give all shards the same --reference" if what == "reference" else "merge them apart"
-            raise SettingError(f"{source}: {what}: is {told[0]}, but {told[1]} in {other}; {mend}")
-
-
-def _copy(source: Path, target: Path) -> None:
-    data = source.read_bytes()
-
-    def fill(part: Path) -> None:
-        part.write_bytes(data)
-
-    write_whole(target, fill)
 
 
 def ordered(points: Iterable[Point]) -> list[Point]:

@@ -14,7 +14,7 @@ from deferred_ir.config import graph_hash, load_graph
 from deferred_ir.errors import GraphError, SettingError
 from deferred_ir.flip import FlipParameters
 from deferred_ir.gl.gpu import Gpu
-from deferred_ir.metrics import compare
+from deferred_ir.metrics import compare, masked_relmse
 from deferred_ir.options import chosen_settings
 from deferred_ir.path_tracer import Progress
 from deferred_ir.renderer import IMAGES, Renderer
@@ -22,7 +22,9 @@ from deferred_ir.scene import Scene
 from deferred_ir.timing import Record
 from deferred_ir.typing import Array
 
-from . import points, sweep_reference
+from . import edges, peer_sweep, points, sweep_reference
+from .edges import Mask
+from .peer_points import Peers
 from .points import Key, Point
 from .sweep_reference import Truth
 
@@ -34,7 +36,10 @@ OVERHEAD = 16
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """What is measured. size: (width, height). shard: (i, n), the i-th of n parts, from 1."""
+    """What is measured. size: (width, height). shard: (i, n), the i-th of n parts, from 1. peers: their names.
+
+    Peers belong to the first shard.
+    """
 
     scene: Scene
     size: tuple[int, int]
@@ -43,6 +48,7 @@ class Sweep:
     seeds: int
     device: str = "auto"
     shard: tuple[int, int] = (1, 1)
+    peers: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         for name, values in (("--graphs", self.graphs), ("--vpls", self.vpls), ("--seeds", range(self.seeds))):
@@ -77,7 +83,7 @@ class Sweep:
         return everything[part - 1 :: parts]
 
 
-def run(sweep: Sweep, folder: Path, reference: Path | None) -> list[Point]:
+def run(sweep: Sweep, folder: Path, reference: Path | None) -> tuple[list[Point], Peers]:
     """Measure what is not in `folder` yet; all points of the sweep's shard."""
     truth = sweep_reference.given(reference, sweep.scene, sweep.size) if reference else None
     gpu = Gpu(sweep.device)
@@ -91,8 +97,15 @@ def run(sweep: Sweep, folder: Path, reference: Path | None) -> list[Point]:
         }
         with _bars() as bar:
             truth = sweep_reference.made(
-                folder, sweep.scene, sweep.size, deciding, images=lambda: _probes(sweep), progress=bar
+                folder,
+                sweep.scene,
+                sweep.size,
+                deciding,
+                images=lambda: _probes(sweep),
+                progress=lambda spp: bar(f"reference, {spp} paths"),
             )
+    with _bars() as bar:
+        mask = edges.made(folder, sweep.scene, sweep.size, progress=lambda: bar("edges"))
     done, ahead = dict[str, Point](), list[tuple[str, int, int]]()
     truth_hash = truth.hash
     for share in sweep.shares():
@@ -104,12 +117,18 @@ def run(sweep: Sweep, folder: Path, reference: Path | None) -> list[Point]:
             ahead.append(share)
     if done:
         print(f"{len(done)} of {len(done) + len(ahead)} points are there already", file=sys.stderr)
-    for point in _measured(sweep, folder, truth, ahead):
+    for point in _measured(sweep, folder, truth, mask, ahead):
         done[point.key.name] = point
-    return points.ordered(done.values())
+    peers = Peers()
+    if sweep.peers and sweep.shard[0] == 1:
+        course = peer_sweep.Course(sweep.scene, sweep.size, sweep.seeds, truth, mask)
+        peers = peer_sweep.run(course, folder, sweep.peers)
+    return points.ordered(done.values()), peers
 
 
-def _measured(sweep: Sweep, folder: Path, truth: Truth, ahead: Sequence[tuple[str, int, int]]) -> Iterator[Point]:
+def _measured(
+    sweep: Sweep, folder: Path, truth: Truth, mask: Mask, ahead: Sequence[tuple[str, int, int]]
+) -> Iterator[Point]:
     """Measure and keep the points `ahead`, with a bar on a terminal."""
     from tqdm import tqdm
 
@@ -123,7 +142,7 @@ def _measured(sweep: Sweep, folder: Path, truth: Truth, ahead: Sequence[tuple[st
                     bar.set_description(f"{graph}, {vpls} VPLs, seed {seed}")
                     key = sweep.key(graph, vpls, seed)
                     yield _measure(
-                        sweep, folder, renderer, truth, flip_parameters=flip_parameters, key=key, graph=graph
+                        sweep, folder, renderer, truth, mask, flip_parameters=flip_parameters, key=key, graph=graph
                     )
                     bar.update(vpls + OVERHEAD)
 
@@ -133,6 +152,7 @@ def _measure(
     folder: Path,
     renderer: Renderer,
     truth: Truth,
+    mask: Mask,
     *,
     flip_parameters: FlipParameters,
     key: Key,
@@ -171,6 +191,7 @@ def _measure(
         relmse=result.relmse,
         relmse_untrimmed=result.relmse_untrimmed,
         bias=result.bias,
+        relmse_masked=masked_relmse(image.radiance, truth.radiance, mask.kept),
         flip=result.flip,
         flip_note=result.flip_note,
         flip_parameters=asdict(flip_parameters) if result.flip is not None else None,
@@ -192,16 +213,16 @@ def _probes(sweep: Sweep) -> list[Array]:
 
 
 @contextmanager
-def _bars() -> Iterator[Callable[[int], Progress]]:
-    """Progress bars on a terminal, one for each image that is traced."""
+def _bars() -> Iterator[Callable[[str], Progress]]:
+    """Progress bars on a terminal, one for each name that is given."""
     from tqdm import tqdm
 
     bars: list[Any] = []
 
-    def begin(spp: int) -> Progress:
+    def begin(name: str) -> Progress:
         for bar in bars:
             bar.close()
-        bars.append(tqdm(desc=f"reference, {spp} paths", disable=not sys.stderr.isatty(), file=sys.stderr))
+        bars.append(tqdm(desc=name, disable=not sys.stderr.isatty(), file=sys.stderr))
 
         def progress(done: int, total: int) -> None:
             bars[-1].total = total

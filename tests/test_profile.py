@@ -15,11 +15,13 @@ import pytest
 from deferred_ir.cli import main
 
 sweep = import_module("deferred_ir.profiling.sweep")
-report = import_module("deferred_ir.profiling.report")
+groups = import_module("deferred_ir.profiling.groups")
 sweep_reference = import_module("deferred_ir.profiling.sweep_reference")
 
 SMALL = ["--graphs", "forward,deferred", "--vpls", "4,8", "--seeds", "2", "--size", "32x32", "--device", "software"]
+SMALL += ["--peers", "none"]
 FILES = {"error_vs_time.csv", "error_vs_time.json", "error_vs_time.svg", "passes.csv", "trace.json", "report.html"}
+MASK = {"mask.npy", "mask.json", "mask.png"}
 COLUMNS = ["graph", "vpls", "seed", "frame_ms", "relmse", "relmse_untrimmed", "bias", "flip", "memory", "flagged"]
 
 
@@ -64,7 +66,7 @@ def points(folder):
 
 
 def test_the_tables_hold_every_point(whole):
-    assert {path.name for path in whole.iterdir()} == FILES | {"points", "reference.npy", "reference.json"}
+    assert {path.name for path in whole.iterdir()} == FILES | MASK | {"points", "reference.npy", "reference.json"}
     rows = table(whole)
     assert list(rows[0])[: len(COLUMNS)] == COLUMNS
     expected = {(graph, n, seed) for graph in ("deferred", "forward") for n in "48" for seed in "01"}
@@ -73,6 +75,8 @@ def test_the_tables_hold_every_point(whole):
     for row in rows:
         assert float(row["frame_ms"]) > 0
         assert 0 < float(row["relmse"]) <= float(row["relmse_untrimmed"])
+        assert float(row["relmse_masked"]) > 0
+        assert row["spp"] == ""
         assert 0 < float(row["flip"]) < 1
         assert int(row["memory"]) > 0
         assert "llvmpipe" in row["device"]
@@ -165,7 +169,7 @@ def test_the_page_stands_alone(whole):
 
 
 def test_a_finished_sweep_measures_nothing_again(copied, measured, monkeypatch):
-    before = {name: (copied / name).read_bytes() for name in FILES | {"reference.npy"}}
+    before = {name: (copied / name).read_bytes() for name in FILES | MASK | {"reference.npy"}}
     monkeypatch.setattr(sweep_reference, "reference", None)  # would fail if it were called
     assert profile(copied) == 0
     assert not measured
@@ -234,18 +238,18 @@ def test_shards_merge_to_the_table_of_the_whole(whole, tmp_path, measured):
     assert len(set(measured)) == len(measured) == 8
     merged = tmp_path / "merged"
     assert main(["profile", "--merge", *map(str, shards), "-o", str(merged)]) == 0
-    assert {path.name for path in merged.iterdir()} == FILES | {"points"}
+    assert {path.name for path in merged.iterdir()} == FILES | MASK | {"points"}
     shutil.copytree(merged / "points", tmp_path / "resumed" / "points")
     assert profile(tmp_path / "resumed", *given) == 0
     assert len(measured) == 8
-    for name in FILES:
+    for name in FILES | MASK:
         assert (merged / name).read_bytes() == (tmp_path / "resumed" / name).read_bytes(), name
     errors = [(row["graph"], row["vpls"], row["seed"], row["relmse"]) for row in table(merged)]
     assert errors == [(row["graph"], row["vpls"], row["seed"], row["relmse"]) for row in table(whole)]
 
 
 def group(graph, vpls, frame_ms, relmse, flagged=False):
-    return report.Group(graph, vpls, 1, frame_ms, relmse, relmse, relmse, flagged)
+    return groups.Group(graph, vpls, 1, frame_ms, relmse, relmse, relmse, flagged)
 
 
 def test_the_pareto_front_is_what_nothing_faster_reaches(whole):
@@ -261,17 +265,17 @@ def test_the_pareto_front_is_what_nothing_faster_reaches(whole):
         replace(first, key=replace(first.key, vpls=n), graph=graph, frames=[ms], relmse=error)
         for (graph, n), (ms, error) in figures.items()
     ]
-    on = {(group.graph, group.vpls) for group in report.grouped(found) if group.pareto}
+    on = {(group.graph, group.vpls) for group in groups.grouped(found) if group.pareto}
     assert on == {("a", 4), ("a", 8), ("c", 4)}
 
 
 def test_the_advice_is_the_best_that_is_fast_enough():
-    groups = [group("a", 16, 10, 0.1), group("a", 64, 49, 0.02), group("b", 64, 45, 0.05), group("a", 256, 90, 0.01)]
-    assert report.advise(groups) == "For 50 ms: a, 64 VPLs, relMSE 0.02 in 49 ms."
+    choices = [group("a", 16, 10, 0.1), group("a", 64, 49, 0.02), group("b", 64, 45, 0.05), group("a", 256, 90, 0.01)]
+    assert groups.advise(choices) == "For 50 ms: a, 64 VPLs, relMSE 0.02 in 49 ms."
     equal = [group("slow", 64, 45, 0.02), group("fast", 64, 20, 0.0201)]
-    assert "fast" in report.advise(equal)
-    assert report.advise(groups, 5).startswith("Nothing here takes 5 ms or less; the fastest: a, 16 VPLs")
-    assert "noise" in report.advise([group("a", 16, 10, 0.1, True)])
+    assert "fast" in groups.advise(equal)
+    assert groups.advise(choices, 5).startswith("Nothing here takes 5 ms or less; the fastest: a, 16 VPLs")
+    assert "noise" in groups.advise([group("a", 16, 10, 0.1, True)])
 
 
 def fault(capsys, *arguments):

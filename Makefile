@@ -9,7 +9,7 @@ PIP    := $(BIN)/python -m pip install -qq --no-input --disable-pip-version-chec
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint types pictures clean
+.PHONY: help demo test lint types pictures bench clean
 
 help:  ## this list
 	@echo "deferred-ir: global illumination on OpenGL"
@@ -27,6 +27,10 @@ test: lint types  ## install, check style and types, run all tests
 
 pictures: $(VENV)/installed  ## render the pictures of README and docs again
 	@$(BIN)/python tools/pictures.py
+
+bench: $(VENV)/installed  ## measure how far from the limits the passes are, for docs/bench.md
+	@$(BIN)/python tools/system.py opengl
+	@$(BIN)/python tools/bench.py
 
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check --quiet .

@@ -1,52 +1,65 @@
-"""How far from the limits: passes against the least that they must do, and deferred against forward, in ratios.
+"""How far from the limits: passes against the least that they must do, deferred against forward, and Python's share.
 
-    python -m deferred_ir.profiling.bench cornell atrium colors --vpls 64 --size 512x512 --turns 15
+    python -m deferred_ir.profiling.bench cornell atrium colors --vpls 64 --size 512x512 --turns 11
 
-Graphs take turns frame by frame, so that a noisy machine disturbs all alike; each turn gives a ratio, and the table
-has their median and quartiles. Passes are held against each other by GPU time, frames by wall time. `--only` measures
-what contains a word: `--only lighting`.
+What is held against each other takes turns, frame by frame or process by process, so that a noisy machine disturbs
+both alike; each turn gives a ratio, and the table has their median and quartiles. Passes are measured by GPU time,
+frames by wall time. `--only` takes the rows whose name contains a word: `--only lighting`.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
+import platform
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import median, quantiles
 from typing import Any
 
 from tqdm import tqdm
 
+from deferred_ir.errors import Error
+from deferred_ir.gl.gpu import Gpu
 from deferred_ir.loading import load
+from deferred_ir.profiling.host_costs import cold_start, python_time
 from deferred_ir.profiling.limits import FOLDER, LIMITS
 from deferred_ir.renderer import Renderer
 from deferred_ir.scene import Scene
 from deferred_ir.scene_file import parse_size
 from deferred_ir.timing import Record
 
-GRAPHS = {"deferred": "deferred", "forward": "forward", **{name: FOLDER / f"{name}.toml" for name in LIMITS}}
+GRAPHS: Mapping[str, str | Path] = {
+    **{name: name for name in ("deferred", "forward")},
+    **{name: FOLDER / f"{name}.toml" for name in LIMITS},
+}
 
 
 @dataclass(frozen=True)
 class Comparison:
     """How often `under` fits into `over`: each a graph and what of it, as `times` takes it."""
 
-    name: str
     over: tuple[str, str]
     under: tuple[str, str]
 
 
-COMPARISONS = (
-    Comparison("lighting / projecting and comparing only", ("deferred", "lighting"), ("limit_lighting", "lighting")),
-    Comparison("forward / deferred, whole frame", ("forward", "frame"), ("deferred", "frame")),
-    Comparison("forward / deferred, without shadow maps", ("forward", "shading"), ("deferred", "shading")),
-)
+COMPARISONS = {
+    "lighting / projecting and comparing alone": Comparison(("deferred", "lighting"), ("limit_lighting", "lighting")),
+    "shadow maps / one plain depth buffer": Comparison(("deferred", "shadow_maps"), ("limit_maps", "shadow_maps")),
+    "forward / deferred, whole frame": Comparison(("forward", "frame"), ("deferred", "frame")),
+    "forward / deferred, without shadow maps": Comparison(("forward", "shading"), ("deferred", "shading")),
+}
+HOST: Mapping[str, Callable[..., list[float]]] = {
+    "cold start / an empty context": cold_start,
+    "Python's own time in a deferred frame, ms": python_time,
+}
 
 
 def take_turns(
-    scene: Scene, graphs: Sequence[str], *, vpls: int, size: tuple[int, int], turns: int, device: str = "auto"
+    scene: Scene, graphs: Sequence[str], *, vpls: int, size: tuple[int, int], turns: int, device: str
 ) -> dict[str, Record]:
     """Times of `turns` frames of each graph; every other turn goes backwards, which evens out a steady drift."""
     records = {graph: Record() for graph in graphs}
@@ -54,7 +67,10 @@ def take_turns(
         renderers = {
             graph: stack.enter_context(Renderer(size, GRAPHS[graph], device, passes=LIMITS)) for graph in graphs
         }
-        plans = {graph: renderer.plan(scene, vpls, ["radiance"]) for graph, renderer in renderers.items()}
+        plans = {
+            graph: renderer.plan(scene, vpls, [name for name in renderer.graph().outputs if name != "display"])
+            for graph, renderer in renderers.items()
+        }
         for graph, renderer in renderers.items():
             renderer.draw(scene, plans[graph])
         for turn in tqdm(range(turns), desc=scene.name, disable=None):
@@ -66,18 +82,12 @@ def take_turns(
 
 
 def times(record: Record, what: str) -> list[float]:
-    """Milliseconds of each frame: wall time of the `frame`, or without its shadow maps, or GPU time of a pass."""
+    """Milliseconds of each frame: wall time of the `frame`, or less its shadow maps (`shading`), or a pass's on GPU."""
     if what == "frame":
         return record.frame_ms
     if what == "shading":
         return [frame - laps["shadow_maps"][0] for frame, laps in zip(record.frame_ms, record.laps, strict=True)]
     return [laps[what][0] for laps in record.laps]
-
-
-def ratios(records: Mapping[str, Record], comparison: Comparison) -> list[float]:
-    """The ratio in each turn."""
-    over, under = (times(records[graph], what) for graph, what in (comparison.over, comparison.under))
-    return [a / b for a, b in zip(over, under, strict=True)]
 
 
 def spread(values: Sequence[float]) -> str:
@@ -88,7 +98,7 @@ def spread(values: Sequence[float]) -> str:
 
 def digits(value: float) -> str:
     """Three significant digits, never as a power of ten."""
-    return f"{value:.0f}" if value >= 99.95 else f"{value:#.3g}"
+    return f"{value:.0f}" if abs(value) >= 99.95 else f"{value:#.3g}"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -96,36 +106,56 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows))
 
 
-def measure(names: Sequence[str], comparisons: Sequence[Comparison], **options: Any) -> str:
-    """The table of `comparisons` on these scenes; medians in milliseconds go to the standard error."""
-    columns = []
-    for name in names:
-        scene = load(name)
-        used = {graph for comparison in comparisons for graph, _ in (comparison.over, comparison.under)}
-        records = take_turns(scene, [graph for graph in GRAPHS if graph in used], **options)
-        for comparison in comparisons:
-            over, under = (median(times(records[g], what)) for g, what in (comparison.over, comparison.under))
-            print(f"{scene.name}: {comparison.name}: {over:.1f} / {under:.1f} ms", file=sys.stderr)
-        columns.append([scene.name, *(spread(ratios(records, comparison)) for comparison in comparisons)])
-    head, *rows = zip(["", *(comparison.name for comparison in comparisons)], *columns, strict=True)
-    return table(head, rows)
+def column(name: str, rows: Sequence[str], **options: Any) -> list[str]:
+    """The cells of a scene; the medians behind its ratios go to the standard error."""
+    scene, cells = load(name), [name]
+    chosen = [COMPARISONS[row] for row in rows if row in COMPARISONS]
+    used = {graph for comparison in chosen for graph, _ in (comparison.over, comparison.under)}
+    records = take_turns(scene, [graph for graph in GRAPHS if graph in used], **options) if used else {}
+    for row in rows:
+        if row in HOST:
+            values = HOST[row](name, **options)
+        else:
+            comparison = COMPARISONS[row]
+            over, under = (times(records[graph], what) for graph, what in (comparison.over, comparison.under))
+            values = [a / b for a, b in zip(over, under, strict=True)]
+            print(f"{name}: {row}: {median(over):.1f} / {median(under):.1f} ms", file=sys.stderr)
+        cells.append(spread(values))
+    return cells
 
 
-def main() -> None:
-    """Print a Markdown table."""
+def report(arguments: Sequence[str] | None = None) -> str:
+    """The table in Markdown, and how it was made."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("scenes", nargs="+", metavar="SCENE")
     parser.add_argument("--vpls", type=int, default=64)
     parser.add_argument("--size", type=parse_size, default=(512, 512))
-    parser.add_argument("--turns", type=int, default=15, choices=range(2, 1000), metavar="N")
+    parser.add_argument("--turns", type=int, default=11, choices=range(2, 1000), metavar="N")
     parser.add_argument("--device", default="auto")
-    parser.add_argument("--only", default="", metavar="WORD")
-    chosen = parser.parse_args()
-    comparisons = [comparison for comparison in COMPARISONS if chosen.only in comparison.name]
-    if not comparisons:
-        parser.error(f"--only {chosen.only}: in none of: {'; '.join(c.name for c in COMPARISONS)}")
+    parser.add_argument("--only", default="", metavar="WORD", help="rows whose name contains it")
+    chosen = parser.parse_args(arguments)
+    rows = [row for row in (*COMPARISONS, *HOST) if chosen.only in row]
+    if not rows:
+        parser.error(f"--only {chosen.only}: in none of: {'; '.join((*COMPARISONS, *HOST))}")
     options = {"vpls": chosen.vpls, "size": chosen.size, "turns": chosen.turns, "device": chosen.device}
-    print(measure(chosen.scenes, comparisons, **options))
+    gpu = Gpu(chosen.device)
+    device = gpu.device.name
+    gpu.close()
+    columns = [column(name, rows, **options) for name in chosen.scenes]
+    head, *body = zip(["", *rows], *columns, strict=True)
+    made = (
+        f"{device}; {os.cpu_count()} cores, Python {platform.python_version()}. {chosen.turns} turns with "
+        f"{chosen.vpls} VPLs at {chosen.size[0]}x{chosen.size[1]}; median (quartiles)."
+    )
+    return f"{table(head, body)}\n\n{made}"
+
+
+def main() -> None:
+    """Print the table."""
+    try:
+        print(report())
+    except Error as error:
+        raise SystemExit(str(error)) from None
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
 from deferred_ir.io import Io
 from deferred_ir.lights import LIGHTS_PER_BLOCK
+from deferred_ir.passes.shadow_maps import ShadowMaps
 
 FOLDER = Path(__file__).parent
 
@@ -42,5 +43,38 @@ class LimitLighting(Pass):
             ctx.enable(ctx.BLEND)
 
 
-LIMITS: Mapping[str, type[Pass]] = {"limit_lighting": LimitLighting}
+class LimitMaps(ShadowMaps):
+    """The same triangles from the same lights into one plain depth buffer of as many texels as the atlas.
+
+    One draw a light into a viewport of its own, where the hardware clips: no layers, tiles or clip distances in the
+    shaders. Layers of the atlas lie above one another, so that every texel comes out the same.
+    """
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """The atlas with its layers laid out."""
+        atlas = super().outputs(inputs)["atlas"]
+        assert isinstance(atlas.description, Texture)
+        assert atlas.description.size
+        width, height = atlas.description.size
+        plain = Texture("depth32f", size=(width, height * atlas.description.layers))
+        return {"atlas": Output("the atlas's layers above one another", plain, atlas.defines)}
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Clear, then draw the scene for each light."""
+        lights, edge = io["lights"], io.framebuffer.size[0]
+        io.framebuffer.clear_depth()
+        self.params.prepare(io.gpu)
+        program = io.program("depth.frag", "plain_maps.vert")
+        maps = self.subpasses({"lights": lights.description})[: len(lights.records)]
+        for i, place in enumerate(maps):
+            size, row = place["size"], edge // place["size"]
+            if i % LIGHTS_PER_BLOCK == 0:
+                lights.bind_uniform(1, i // LIGHTS_PER_BLOCK)
+            y, x = divmod(place["tile"], row)
+            io.gpu.gl.Viewport(x * size, place["layer"] * edge + y * size, size, size)
+            program.set(light_number=i % LIGHTS_PER_BLOCK)
+            frame.buffers.draw(program)
+
+
+LIMITS: Mapping[str, type[Pass]] = {"limit_lighting": LimitLighting, "limit_maps": LimitMaps}
 """By the name of their type; a graph file beside this one, of the same name, puts each in its place."""

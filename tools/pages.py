@@ -95,3 +95,12 @@ def anchors(page: Path) -> set[str]:
 def paths(page: Path) -> set[str]:
     """Code spans of a page that are paths in the repository, such as `passes/vpl.py`."""
     return {span for span in re.findall(r"`([^`\n]+)`", _outside_blocks(page)) if re.fullmatch(r"(\w+/)+[\w.-]*", span)}
+
+
+def between(page: str, begin: str, end: str, text: str) -> str:
+    """The text of a page with `text` between two markers, in the place of what stands there."""
+    before, found, rest = page.partition(begin)
+    _, closed, after = rest.partition(end)
+    if not found or not closed:
+        raise SystemExit(f"a page has no markers '{begin}' and '{end}'")
+    return f"{before}{begin}\n\n{text}\n{end}{after}"

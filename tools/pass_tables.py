@@ -11,7 +11,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from pages import ROOT
+from pages import ROOT, between
 
 from deferred_ir import config
 from deferred_ir.graph import Step, compile
@@ -67,11 +67,7 @@ def tables() -> str:
 
 def updated(page: str) -> str:
     """The page with its tables as they should be."""
-    before, begin, rest = page.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise SystemExit(f"{PAGE.name}: has no markers '{BEGIN}' and '{END}'")
-    return f"{before}{begin}\n\n{tables()}\n{end}{after}"
+    return between(page, BEGIN, END, tables())
 
 
 if __name__ == "__main__":

@@ -1,0 +1,28 @@
+"""Measures the limits and writes the table into docs/bench.md: `python tools/bench.py`, or `make bench`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from pages import ROOT, between
+
+from deferred_ir.profiling import bench
+
+PAGE = ROOT / "docs" / "bench.md"
+BEGIN = "<!-- limits: written by tools/bench.py -->"
+END = "<!-- end of limits -->"
+SCENES = ("cornell", "atrium", "colors")
+
+
+def main() -> None:
+    """Measure, print and write."""
+    found = bench.report(SCENES)
+    print(found)
+    PAGE.write_text(between(PAGE.read_text(encoding="utf-8"), BEGIN, END, found), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -9,7 +9,7 @@ PIP    := $(BIN)/python -m pip install -qq --no-input --disable-pip-version-chec
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint types pictures bench clean
+.PHONY: help demo test lint types pictures bench look clean
 
 help:  ## this list
 	@echo "deferred-ir: global illumination on OpenGL"
@@ -31,6 +31,11 @@ pictures: $(VENV)/installed  ## render the pictures of README and docs again
 bench: $(VENV)/installed  ## measure how far from the limits the passes are, for docs/bench.md
 	@$(BIN)/python tools/system.py opengl
 	@$(BIN)/python tools/bench.py
+
+look: $(VENV)/installed-dev  ## screenshot of a small report to out/report.png
+	@$(BIN)/python tools/system.py opengl
+	@$(BIN)/python tools/system.py browser
+	@$(BIN)/python tools/look.py
 
 lint: $(VENV)/installed-dev
 	@$(BIN)/ruff check --quiet .

@@ -1,4 +1,4 @@
-"""System parts that pip cannot install: `python tools/system.py venv|opengl`.
+"""System parts that pip cannot install: `python tools/system.py venv|opengl|browser`.
 
 Looks for the part, installs it by apt-get where that is possible and allowed, else says in one line what to install.
 Runs before anything is installed, so it uses the standard library only (`opengl` runs with deferred-ir in place).
@@ -11,7 +11,12 @@ import shutil
 import subprocess
 import sys
 
-PACKAGES = {"venv": ["python3-venv"], "opengl": ["libegl1", "libgl1-mesa-dri"]}
+PACKAGES = {
+    "venv": ["python3-venv"],
+    "opengl": ["libegl1", "libgl1-mesa-dri"],
+    "browser": ["chromium", "fonts-dejavu-core"],
+}
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 OPEN_CONTEXT = """
 from deferred_ir.errors import Error
 from deferred_ir.gl.devices import create_context
@@ -20,7 +25,12 @@ try:
 except Error as error:
     raise SystemExit(str(error))
 """
-PROBES = {"venv": "import venv, ensurepip", "opengl": OPEN_CONTEXT}
+FIND_BROWSER = f"""
+import shutil
+if not any(map(shutil.which, {BROWSERS})):
+    raise SystemExit("no browser for screenshots: none of {", ".join(BROWSERS)} is installed")
+"""
+PROBES = {"venv": "import venv, ensurepip", "opengl": OPEN_CONTEXT, "browser": FIND_BROWSER}
 
 
 def fault(part: str) -> str:

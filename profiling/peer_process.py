@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import traceback
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -39,7 +40,7 @@ class _Refusal:
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    name: str
+    module: str
     scene: Scene
     size: tuple[int, int]
     bounces: int
@@ -56,10 +57,9 @@ class PeerProcess:
 
     def __init__(self, name: str, scene: Scene, size: tuple[int, int], bounces: int, log: Path) -> None:
         self._log = log
-        self._limit = LIMIT
         context = multiprocessing.get_context("spawn")
         self._end, theirs = context.Pipe()
-        task = _Task(name, scene, size, bounces, log)
+        task = _Task(module(name).__name__, scene, size, bounces, log)
         self._process = context.Process(target=serve, args=(theirs, task), daemon=True, name=f"peer {name}")
         # Another thread waits for answers: Python gives Ctrl-C at once to a main thread that waits for a thread.
         self._waiting = ThreadPoolExecutor(1)
@@ -95,9 +95,9 @@ class PeerProcess:
 
     def _answer(self) -> Any:
         try:
-            answer = self._waiting.submit(self._end.recv).result(self._limit)
+            answer = self._waiting.submit(self._end.recv).result(LIMIT)
         except TimeoutError:
-            raise PeerError(f"gave no answer for {self._limit:g} s; see {self._log}") from None
+            raise PeerError(f"gave no answer for {LIMIT:g} s; see {self._log}") from None
         except (EOFError, OSError):
             raise PeerError(self._epitaph()) from None
         if isinstance(answer, _Refusal):
@@ -139,7 +139,7 @@ def serve(end: Connection, task: _Task) -> None:
     for number in (1, 2):
         os.dup2(to_log, number)
     try:
-        peer = module(task.name).Peer(task.scene, task.size, task.bounces)
+        peer = importlib.import_module(task.module).Peer(task.scene, task.size, task.bounces)
         end.send(peer.about)
         while (wanted := end.recv()) is not None:
             end.send(peer.render(*wanted))
@@ -148,6 +148,7 @@ def serve(end: Connection, task: _Task) -> None:
     except Error as error:
         end.send(_Refusal(str(error)))
     except Exception as error:  # of a library: it is told in a line, its traceback is in the log
+        traceback.print_exc()
+        sys.stderr.flush()  # before the answer, upon which this process may be ended
         line = " ".join(str(error).split())[:200]
         end.send(_Refusal(f"{type(error).__name__}: {line}; see {task.log}"))
-        raise

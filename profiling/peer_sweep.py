@@ -57,8 +57,10 @@ def chosen(text: str | None) -> Sequence[str]:
     if names == ["none"]:
         return ()
     for name in names:
+        if name == "none":
+            raise SettingError(f"--peers {text}: 'none' stands alone; leave it out, or the others")
         if name not in NAMES:
-            raise SettingError(f"--peers {text}: no peer '{name}'{did_you_mean(name, [*NAMES, 'none'])}")
+            raise SettingError(f"--peers {text}: no peer '{name}'{did_you_mean(name, NAMES)}")
     if not names:
         raise SettingError("--peers: names nothing; write --peers none to leave them out")
     return names
@@ -124,8 +126,8 @@ def climb(measure: Callable[[int, int], PeerPoint], seeds: int) -> Iterator[Peer
             yield rung[-1]
         spent += sum(point.ms for point in rung)
         ahead = 2 * mean(point.ms for point in rung)
-        errors = [point.relmse_masked for point in rung]
-        if any(error is None or error <= ENOUGH for error in errors):
+        errors = [point.relmse_masked for point in rung if point.relmse_masked is not None]
+        if not errors or mean(errors) <= ENOUGH:
             return
         spp *= 2
 

@@ -10,7 +10,7 @@ import sys
 import traceback
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -79,10 +79,12 @@ class PeerProcess:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         if kind is None:
-            self._end.send(None)
+            with suppress(OSError):  # it has ended already
+                self._end.send(None)
             self._process.join(GRACE)
-            self._log.unlink(missing_ok=True)
         self._kill()
+        if kind is None or not issubclass(kind, Exception):  # nothing failed
+            self._log.unlink(missing_ok=True)
 
     def render(self, spp: int, seed: int) -> Rendered:
         """An image of `spp` paths a pixel."""

@@ -431,6 +431,7 @@ def test_ctrl_c_ends_a_peer_that_renders(process, capfd):
     with pytest.raises(KeyboardInterrupt), peer:
         peer.render(fake_peer.HANGS, 0)
     assert not peer._process.is_alive()
+    assert not process.log.exists()
     assert capfd.readouterr() == ("", "")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -27,6 +28,8 @@ BUDGET = 90e3
 QUICK = 5e3
 """Milliseconds: a rung has all seeds if they are likely to take less together, else the first alone."""
 MOST_SPP = 1 << 14
+STALLED, STALLS = 0.95, 2
+"""The ladder also ends after so many rungs in a row with more than this part of the error of the one before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +95,7 @@ def _measured(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
     from tqdm import tqdm
 
     log = peer_points.make_folder(folder) / f"{name}.log"
-    style = "{desc} {percentage:3.0f}%|{bar}| {elapsed}, at most {remaining} left"
+    style = "{desc} {percentage:3.0f}%|{bar}| {elapsed}{postfix}"
     with (
         ExitStack() as stack,
         tqdm(total=BUDGET, bar_format=style, disable=not sys.stderr.isatty(), file=sys.stderr) as bar,
@@ -111,15 +114,17 @@ def _measured(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
                 point = _point(course, key, process)
                 peer_points.save(folder, point)
             bar.update(min(point.ms, BUDGET - bar.n))
+            bar.set_postfix_str(f"at most {tqdm.format_interval((BUDGET - bar.n) / 1e3)} left")
             return point
 
         yield from climb(measure, course.seeds)
 
 
 def climb(measure: Callable[[int, int], PeerPoint], seeds: int) -> Iterator[PeerPoint]:
-    """Points by `measure(spp, seed)`, until the error is small enough or the time used up."""
+    """Points by `measure(spp, seed)`, until the error is small enough, falls no longer, or the time is used up."""
     spent, ahead, spp = 0.0, 0.0, 1
-    while spp <= MOST_SPP and spent + ahead <= BUDGET:
+    last, stalls = math.inf, 0
+    while spp <= MOST_SPP and spent + ahead <= BUDGET and stalls < STALLS:
         rung = []
         for seed in range(seeds if ahead * seeds <= QUICK else 1):
             rung.append(measure(spp, seed))
@@ -129,6 +134,8 @@ def climb(measure: Callable[[int, int], PeerPoint], seeds: int) -> Iterator[Peer
         errors = [point.relmse_masked for point in rung if point.relmse_masked is not None]
         if not errors or mean(errors) <= ENOUGH:
             return
+        stalls = stalls + 1 if mean(errors) > STALLED * last else 0
+        last = mean(errors)
         spp *= 2
 
 

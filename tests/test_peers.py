@@ -284,6 +284,8 @@ def point(spp, seed, ms, error):
 
 
 def climbed(ms_a_path, error_of_one, seeds=3):
+    """(paths, seed) where the error is inverse to the paths."""
+
     def measure(spp, seed):
         error = None if error_of_one is None else error_of_one / spp
         return point(spp, seed, ms_a_path * spp, error)
@@ -304,6 +306,12 @@ def test_the_ladder_ends_with_its_time_and_slow_rungs_have_one_seed():
     assert [seed for spp, seed in rungs if spp == 1] == [0, 1, 2]
     assert [seed for spp, seed in rungs if spp == 2] == [0]
     assert climbed(1e-3, 1e9, seeds=1)[-1][0] == peer_sweep.MOST_SPP
+
+
+def test_the_ladder_ends_where_the_error_falls_no_longer():
+    errors = {1: 0.4, 2: 0.5, 4: 0.2, 8: 0.199, 16: 0.1, 32: 0.0999, 64: 0.0998}
+    made = peer_sweep.climb(lambda spp, seed: point(spp, seed, 1.0, errors[spp]), 1)
+    assert [one.key.spp for one in made] == list(errors)
 
 
 # Equal error.

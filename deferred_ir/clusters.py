@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from .typing import Array, Bools, Ints
@@ -21,12 +23,15 @@ class Clusters:
     def __init__(self, positions: Array, faces: Ints, most: int = CLUSTER) -> None:
         corners = positions.astype(np.float32)[faces]
         low, high = corners.min(axis=1), corners.max(axis=1)
-        self.order, self.starts = _split(low / 2 + high / 2, most)
+        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        # Triangles of like size together: one large triangle would make its cluster bend in more maps than its own.
+        self.order, self.starts = _split(low / 2 + high / 2, _octaves(edges), most)
         first = self.starts[:-1]
         low, high = np.minimum.reduceat(low[self.order], first), np.maximum.reduceat(high[self.order], first)
         centre = low / 2 + high / 2
         half = np.maximum(high - centre, centre - low)
         self._reach = np.abs([low, high]).max()
+        self._longest = np.maximum.reduceat(edges[self.order], first)
         self._boxes = np.concatenate([centre, half, np.ones((len(first), 1), np.float32)], axis=1).T.copy()
 
     def __len__(self) -> int:
@@ -57,10 +62,29 @@ class Clusters:
             outside |= np.column_stack([normal, np.abs(normal), offset]) @ self._boxes < 0
         return ~outside
 
+    def bent(self, lights: np.ndarray, reach: Array) -> Bools:
+        """Which clusters have an edge that may be closer to a light than `reach` (n,) times its length: bool (n, C)."""
+        centre, half = self._boxes[:3], self._boxes[3:6]
+        away = np.maximum(np.abs(lights["position"][:, :, None] - centre) - half, 0)
+        bent: Bools = (away**2).sum(axis=1) < (reach[:, None] * self._longest) ** 2
+        return bent
 
-def _split(points: Array, most: int) -> tuple[Ints, Ints]:
-    """Halve `points` (n, 3) across their longest extent until no part has more than `most`: order (n,), starts."""
-    order, starts, ahead = np.arange(len(points)), [len(points)], [(0, len(points))]
+
+def _octaves(edges: Array) -> Ints:
+    """Class of each triangle by its longest edge (F,): halves of the longest of all, down to 1/1024."""
+    longest = edges.max()
+    classes: Ints = np.ceil(np.log2(np.maximum(edges / longest if longest > 0 else edges, 2.0**-10))).astype(np.intp)
+    return classes
+
+
+def _split(points: Array, classes: Ints, most: int) -> tuple[Ints, Ints]:
+    """Halve the `points` (n, 3) of each class across their longest extent until no part has more than `most`.
+
+    Returns order (n,) and starts.
+    """
+    order = np.argsort(classes, kind="stable")
+    bounds = [0, *(np.flatnonzero(np.diff(classes[order])) + 1).tolist(), len(points)]
+    starts, ahead = [len(points)], list(itertools.pairwise(bounds))
     while ahead:
         start, end = ahead.pop()
         if end - start <= most:

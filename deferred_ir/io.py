@@ -72,18 +72,12 @@ class Io:
             port = self._step.work.inputs[name]
             self[name].bind(unit, self.gpu.sampler(port.linear, port.compare))
 
-    def program(
-        self,
-        fragment: str | None,
-        vertex: str = "fullscreen.vert",
-        geometry: str | None = None,
-        defines: Mapping[str, int | float] = NO_DEFINES,
-    ) -> Program:
-        """The program of these shader files, with the defines of this pass's ports and `defines`."""
-        key = (fragment, vertex, geometry, *defines.items())
+    def program(self, *files: str, defines: Mapping[str, int | float] = NO_DEFINES) -> Program:
+        """The program of these shader files, one a stage, with the defines of this pass's ports and `defines`."""
+        key = (*files, *defines.items())
         if key not in self._programs:
             folder = self._step.work.shader_folder
-            program = self._library.program(fragment, vertex, geometry, {**self._defines, **defines}, folder)
+            program = self._library.program(*files, defines={**self._defines, **defines}, folder=folder)
             unknown = program.samplers - SCENE_SAMPLERS - set(self._step.work.inputs)
             if unknown:
                 raise ShaderError(f"{program.name}: sampler '{min(unknown)}' is no input of pass {self._step.name}")

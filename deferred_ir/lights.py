@@ -25,7 +25,7 @@ LIGHT = np.dtype(
         ("z_axis", "f4", 3),  # unit; where the light looks
         ("tile", "f4"),  # number of its tile in the atlas; the spotlight's (SPOT_TILE) is a whole layer
         ("emission", "f4", 3),
-        ("unused", "f4"),
+        ("curve", "f4"),  # c / (1 + c), c the cosine of the half cone angle: scales paraboloid maps
     ]
 )
 """One light in a std140 uniform block; shaders/lib/light.glsl declares the same five vec4."""
@@ -98,5 +98,7 @@ def light_records(position: Array, axis: Array, emission: Array, *, fov: float, 
     records["position"], records["z_axis"], records["emission"] = position, axis, emission
     records["x_axis"], records["y_axis"] = right / tangent, up / tangent
     records["tan_half"], records["one_minus_cos"] = tangent, one_minus_cos(fov)
+    cosine = np.cos(np.radians(fov) / 2)
+    records["curve"] = cosine / (1 + cosine)
     records["tile"] = tile
     return records

@@ -5,8 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+
 from .errors import GraphError
+from .lights import one_minus_cos
 from .params import param
+from .typing import Array, Bools
+
+WIDEST_PLANAR = 140.0
+"""A spotlight wider than this, in degrees, gets a paraboloid map: the planar one has few texels for its middle."""
 
 
 @dataclass(frozen=True)
@@ -16,9 +23,15 @@ class MapParams:
     spot_size: int = param(2048, lo=16, hi=16384, doc="Width and height of the spotlight's map, texels.")
     vpl_size: int = param(256, lo=16, hi=4096, doc="Width and height of a VPL's map, texels.")
     spot_offset: float = param(
-        1.0, lo=0.0, hi=16.0, doc="How far a point is lifted off its face before the spotlight's map is asked, texels."
+        0.1, lo=0.0, hi=16.0, doc="How far a point is lifted off its face before the spotlight's map is asked, texels."
     )
-    vpl_offset: float = param(0.75, lo=0.0, hi=16.0, doc="The same before a VPL's map is asked, texels.")
+    vpl_offset: float = param(0.25, lo=0.0, hi=16.0, doc="The same before a VPL's map is asked, texels.")
+    projection: Literal["perspective", "paraboloid"] = param(
+        "perspective", doc="Of the VPLs' maps. The spotlight's is a paraboloid where it is wider than 140 degrees."
+    )
+    bend: float = param(
+        1.0, lo=0.1, hi=64.0, doc="Paraboloid maps: edges that may be off by more texels than this are split."
+    )
     cull: Literal["none", "front"] = param(
         "none", doc="front: draw back faces only, which moves the bias to the dark side; for closed meshes."
     )
@@ -42,11 +55,28 @@ class MapParams:
     def defines(self) -> dict[str, int | float]:
         """For the shaders of writer and readers."""
         return {
+            "VPL_PARABOLOID": int(self.projection == "paraboloid"),
+            "WIDE_SPOT": one_minus_cos(WIDEST_PLANAR),
             "SPOT_SIZE": self.spot_size,
             "VPL_SIZE": self.vpl_size,
             "SPOT_OFFSET": float(self.spot_offset),
             "VPL_OFFSET": float(self.vpl_offset),
         }
+
+    def paraboloid(self, records: np.ndarray) -> Bools:
+        """Which lights' maps are paraboloids, bool (n,); records: LIGHT (n,)."""
+        wide = records["one_minus_cos"] > np.float32(one_minus_cos(WIDEST_PLANAR))
+        chosen: Bools = np.where(records["tile"] < 0, wide, self.projection == "paraboloid")
+        return chosen
+
+    def reach(self, records: np.ndarray) -> Array:
+        """How many of its lengths an edge must be away from a light to bend by less than `bend` texels, (n,).
+
+        An edge that subtends an angle a from the light bends by a^2 / 8 of the hemisphere's radius at most.
+        """
+        size = np.where(records["tile"] < 0, self.spot_size, self.vpl_size)
+        reach: Array = np.sqrt(size / (16 * records["curve"] * records["tan_half"] * self.bend))
+        return reach
 
     def prepare(self, gpu: Any) -> None:
         """OpenGL state for drawing maps in reversed depth."""

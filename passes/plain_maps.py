@@ -8,6 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+import numpy as np
+
+from deferred_ir import paraboloid_maps
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.io import Io
@@ -43,14 +46,21 @@ class PlainMaps(Pass):
         self.params.prepare(io.gpu)
         program = io.program("depth.frag", "plain_maps.vert")
         total = len(io["lights"].records)
+        curved = self.params.paraboloid(io["lights"].records)
         for i, texture in enumerate([*io["spot"], *io["vpls"]][:total]):
-            if i % LIGHTS_PER_BLOCK == 0:
-                io["lights"].bind_uniform(1, i // LIGHTS_PER_BLOCK)
+            block, number = divmod(i, LIGHTS_PER_BLOCK)
+            if number == 0:
+                io["lights"].bind_uniform(1, block)
             framebuffer = texture.framebuffer
             framebuffer.bind()
             framebuffer.clear_depth()
-            program.set(light_number=i % LIGHTS_PER_BLOCK)
-            frame.buffers.draw(program)
+            if curved[i]:
+                records = io["lights"].records[block * LIGHTS_PER_BLOCK :][:LIGHTS_PER_BLOCK]
+                only = np.arange(len(records)) == number
+                paraboloid_maps.draw(frame, io, self.params, records, only, layered=False)
+            else:
+                program.set(light_number=number)
+                frame.buffers.draw(program)
         io.count("maps_drawn", total)
 
 

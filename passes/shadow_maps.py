@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+from deferred_ir import paraboloid_maps
 from deferred_ir.frame import Frame
 from deferred_ir.gl import raw
 from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
@@ -50,9 +51,10 @@ class ShadowMaps(Pass):
     def subpasses(self, inputs: Mapping[str, Description | None]) -> Sequence[Mapping[str, Any]]:
         """A sub-pass for each light that the buffer can hold."""
         per_layer, why = self._tiles_per_layer(), "every frame redoes everything"
-        spot = {"light": "spotlight", "layer": 0, "tile": 0, "size": self.params.spot_size}
+        spot = {"light": "spotlight", "projection": "perspective", "layer": 0, "tile": 0, "size": self.params.spot_size}
         tiles = [
-            {"light": f"vpl {i}", "layer": 1 + i // per_layer, "tile": i % per_layer, "size": self.params.vpl_size}
+            {"light": f"vpl {i}", "projection": self.params.projection, "layer": 1 + i // per_layer}
+            | {"tile": i % per_layer, "size": self.params.vpl_size}
             for i in range(_lights(inputs) - 1)
         ]
         return [{**tile, "state": "dirty", "why": why} for tile in [spot, *tiles]]
@@ -64,14 +66,18 @@ class ShadowMaps(Pass):
         self.params.prepare(gpu)
         for side in range(4):
             gpu.ctx.enable_direct(raw.CLIP_DISTANCE0 + side)
-        geometry = None if gpu.layer_from_vertex else "shadow_maps.geom"
-        program = io.program("depth.frag", "shadow_maps.vert", geometry)
+        geometry = [] if gpu.layer_from_vertex else ["shadow_maps.geom"]
+        program = io.program("depth.frag", "shadow_maps.vert", *geometry)
         total = len(lights.records)
         clusters = frame.buffers.cluster_buffers.clusters
         for start in range(0, total, LIGHTS_PER_BLOCK):
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
-            visible = clusters.visible(lights.records[start : start + LIGHTS_PER_BLOCK])
-            frame.buffers.draw_clusters(program, visible)
+            records = lights.records[start : start + LIGHTS_PER_BLOCK]
+            curved = self.params.paraboloid(records)
+            if not curved.all():
+                frame.buffers.draw_clusters(program, clusters.visible(records) & ~curved[:, None])
+            if curved.any():
+                paraboloid_maps.draw(frame, io, self.params, records, curved, layered=True)
         io.count("maps_drawn", total)
 
 

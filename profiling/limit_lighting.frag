@@ -20,8 +20,8 @@ void main() {
     }
     vec3 position = unproject(ndc, d);
     float seen = 0.0;
-    if (first == 1) seen = atlas_visibility(shadows, lights[0], SPOT_SIZE, 0.0, position, vec3(0.0));
+    if (first == 1) seen = atlas_visibility(shadows, lights[0], SPOT_RECEIVER(lights[0], position, vec3(0.0), SPOT_SIZE, 0.0), SPOT_SIZE);
     for (int i = first; i < count; ++i)
-        seen += atlas_visibility(shadows, lights[i], VPL_SIZE, 0.0, position, vec3(0.0));
+        seen += atlas_visibility(shadows, lights[i], VPL_RECEIVER(lights[i], position, vec3(0.0), VPL_SIZE, 0.0), VPL_SIZE);
     radiance = vec4(seen);
 }

@@ -17,6 +17,7 @@ from deferred_ir.camera import Camera
 from deferred_ir.config import graph_hash, load_graph
 from deferred_ir.graph import compile
 from deferred_ir.lights import NEAR
+from deferred_ir.maps import WIDEST_PLANAR, MapParams
 from deferred_ir.params import specs
 from deferred_ir.path_tracer import Progress
 from deferred_ir.renderer import Renderer
@@ -118,7 +119,8 @@ def _planned(scene: Scene, options: Options) -> list[tuple[dict[str, Any], list[
     planned, known = list[tuple[dict[str, Any], list[_Maps]]](), set[_Maps]()
     if not scene.facts.emits:
         return planned
-    for projection, choice in _projections(options.settings).items():
+    wide = scene.spotlight.fov > WIDEST_PLANAR
+    for choice in _projections(options.settings):
         for vpl_size in options.vpl_sizes:
             settings = {**options.settings, **choice, VPL_SIZE: vpl_size}
             graph = load_graph(GRAPH, settings, PASSES)
@@ -126,7 +128,7 @@ def _planned(scene: Scene, options: Options) -> list[tuple[dict[str, Any], list[
             step = next(step for step in steps if step.name == MAPS)
             parts = step.work.subpasses(step.descriptions)  # the spotlight's, then those of VPLs
             found = [
-                _Maps(lights, part.get("projection", projection), part["size"])
+                _Maps(lights, "paraboloid" if lights == "spotlight" and wide else part["projection"], part["size"])
                 for lights, part in zip(("spotlight", "vpls"), parts, strict=False)
             ]
             planned.append((settings, [maps for maps in found if maps not in known]))
@@ -134,14 +136,11 @@ def _planned(scene: Scene, options: Options) -> list[tuple[dict[str, Any], list[
     return [(settings, maps) for settings, maps in planned if maps]
 
 
-def _projections(settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """The projections that maps can have, each with the setting for it; only that which `settings` ask for, if any."""
-    params = load_graph(GRAPH, settings, PASSES).nodes[MAPS].work.params
-    spec = specs(type(params)).get("projection")
-    if spec is None:
-        return {"perspective": {}}
-    name = f"{MAPS}.{spec.name}"
-    return {choice: {name: choice} for choice in ([settings[name]] if name in settings else spec.choices)}
+def _projections(settings: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The settings for each projection that maps can have; only for that which `settings` ask for, if any."""
+    name = f"{MAPS}.projection"
+    choices = [settings[name]] if name in settings else specs(MapParams)["projection"].choices
+    return [{name: choice} for choice in choices]
 
 
 def _frames(renderer: Renderer, scene: Scene, lights: str, options: Options, progress: Progress | None) -> Array:

@@ -5,5 +5,5 @@ uniform int light_number;  // in this block
 in vec3 position;
 
 void main() {
-    gl_Position = light_clip(lights[light_number], position);
+    gl_Position = planar_clip(lights[light_number], position);
 }

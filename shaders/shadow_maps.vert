@@ -18,14 +18,14 @@ flat out int layer;
 
 void main() {
     Light light = lights[light_index];
-    vec4 clip = light_clip(light, position);
+    vec4 clip = planar_clip(light, position);
     vec4 tile = atlas_tile(light);
     // The four sides of the map: the hardware clips at those of the whole layer only.
     gl_ClipDistance[0] = clip.w + clip.x;
     gl_ClipDistance[1] = clip.w - clip.x;
     gl_ClipDistance[2] = clip.w + clip.y;
     gl_ClipDistance[3] = clip.w - clip.y;
-    gl_Position = vec4(clip.xy * tile.z + (tile.xy * 2.0 + tile.z - 1.0) * clip.w, clip.zw);
+    gl_Position = in_tile(clip, tile);
 #if LAYER_FROM_VERTEX
     gl_Layer = int(tile.w);
 #else

@@ -52,10 +52,27 @@ def test_each_triangle_is_in_one_cluster(count):
     assert sorted(clusters.order) == list(range(count))
     assert clusters.starts[0] == 0
     assert clusters.starts[-1] == count
-    assert len(clusters) == -(-count // 8)
     assert (clusters.sizes >= 1).all()
     assert (clusters.sizes <= 8).all()
+
+
+@pytest.mark.parametrize("count", [8, 17, 100])
+def test_clusters_of_triangles_of_one_size_are_full_but_for_the_last(count):
+    corners = np.random.default_rng(0).uniform(-1, 1, (count, 1, 3)) + np.eye(3)
+    clusters = Clusters(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3), most=8)
+    assert len(clusters) == -(-count // 8)
     assert (clusters.sizes == 8).sum() == count // 8
+
+
+def test_a_cluster_holds_triangles_of_like_size():
+    """So a large triangle does not count as bent, with all its neighbours, in maps in which they are flat."""
+    mesh = soup(2, 400)
+    corners = mesh.positions[mesh.faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    clusters = Clusters(mesh.positions, mesh.faces, most=8)
+    for start, end in zip(clusters.starts[:-1], clusters.starts[1:], strict=True):
+        part = longest[clusters.order[start:end]]
+        assert part.max() <= 2 * part.min() * (1 + 1e-6) or part.max() < 2**-9 * longest.max()
 
 
 def test_clusters_are_neighbours():
@@ -107,12 +124,13 @@ def test_what_a_light_cannot_see_is_left_out(hemisphere):
     light = vpl_records(np.zeros((1, 3)), [(0.3, 0.5, -0.2)], np.ones((1, 3)), fov=90.0)
     share = clusters.visible(light, hemisphere=hemisphere)[0] @ clusters.sizes / 4000
     seen = 1 / 2 if hemisphere else 1 / 6
-    assert seen <= share < seen + 0.07
+    assert seen <= share < seen + 0.1
 
 
 def test_no_lights_see_no_clusters():
     mesh = soup(1)
-    assert Clusters(mesh.positions, mesh.faces, most=8).visible(np.zeros(0, LIGHT)).shape == (0, 38)
+    clusters = Clusters(mesh.positions, mesh.faces, most=8)
+    assert clusters.visible(np.zeros(0, LIGHT)).shape == (0, len(clusters))
 
 
 # On the device

@@ -99,7 +99,7 @@ def test_a_missing_file_gets_the_list_of_shaders_and_nothing_else(folder):
         flatten("zzz", [folder, package_shaders()], {})
     known = str(raised.value).partition("known: ")[2].split(", ")
     assert {"own.frag", "lighting.frag", "lib/light.glsl"} <= set(known)
-    assert {Path(name).suffix for name in known} <= {".vert", ".frag", ".geom", ".comp", ".glsl"}
+    assert {Path(name).suffix for name in known} <= {".vert", ".frag", ".geom", ".tesc", ".tese", ".glsl"}
 
 
 # Compiling

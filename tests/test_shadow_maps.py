@@ -158,6 +158,7 @@ def test_each_light_has_a_sub_pass_with_its_place(renderer):
     assert len(parts) == 71
     assert parts[0] == {
         "light": "spotlight",
+        "projection": "perspective",
         "layer": 0,
         "tile": 0,
         "size": 2048,

@@ -38,7 +38,7 @@ class ClusterBuffers:
         attributes = [(*positions, "position"), (self._lights, "1i/i", "light_index")]
         return self.gpu.ctx.vertex_array(program.glsl, attributes, self._indices, index_element_size=4)
 
-    def draw(self, array: Any, visible: Bools) -> None:
+    def draw(self, array: Any, visible: Bools, patches: bool = False) -> None:
         """Draw cluster c with light_index l wherever visible[l, c], bool (lights, clusters)."""
         cluster, light = np.nonzero(visible.T)
         instances = np.bincount(cluster, minlength=len(self.clusters))
@@ -52,7 +52,10 @@ class ClusterBuffers:
             self.gpu.gl.check(f"drawing {len(light)} clusters")
         self._lights.write(light.astype("i4").tobytes())
         self._commands.write(commands.tobytes())
-        array.render_indirect(self._commands, self.gpu.ctx.TRIANGLES, count=len(commands))
+        if patches:
+            self.gpu.ctx.patch_vertices = 3
+        mode = self.gpu.ctx.PATCHES if patches else self.gpu.ctx.TRIANGLES
+        array.render_indirect(self._commands, mode, count=len(commands))
 
     def release(self) -> None:
         """Give the buffers back."""

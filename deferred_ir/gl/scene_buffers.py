@@ -105,14 +105,14 @@ class SceneBuffers:
             program.set(textured=texture is not None, first_face=first)
             array.render(self.gpu.ctx.TRIANGLES, vertices=3 * count, first=3 * first, instances=instances)
 
-    def draw_clusters(self, program: Program, visible: Bools) -> None:
+    def draw_clusters(self, program: Program, visible: Bools, patches: bool = False) -> None:
         """Draw each cluster of `cluster_buffers` for the lights that may see it: bool (lights, clusters).
 
         The program reads `position` and `light_index`, the row of `visible`.
         """
         if self not in program.arrays:
             program.arrays[self] = self.cluster_buffers.array(program, self._attributes["position"])
-        self.cluster_buffers.draw(program.arrays[self], visible)
+        self.cluster_buffers.draw(program.arrays[self], visible, patches)
 
     def release(self) -> None:
         """Give everything back. Vertex arrays that programs keep for this scene must go first."""

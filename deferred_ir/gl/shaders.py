@@ -16,7 +16,16 @@ from ..errors import ShaderError, did_you_mean
 from .gpu import Gpu
 
 VERSION = "#version 430 core"
-_SUFFIXES = {".vert", ".geom", ".frag", ".comp", ".glsl"}
+STAGES = {
+    ".vert": "vertex_shader",
+    ".tesc": "tess_control_shader",
+    ".tese": "tess_evaluation_shader",
+    ".geom": "geometry_shader",
+    ".frag": "fragment_shader",
+}
+"""moderngl's name of the stage that a file is, by its suffix."""
+FULLSCREEN = "fullscreen.vert"
+_SUFFIXES = {*STAGES, ".glsl"}
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 _MESSAGE = re.compile(r"^(?:ERROR: )?\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*(.*)$", re.MULTILINE)  # Mesa, NVIDIA, AMD, Intel
 # Every GL_*SAMPLER_*: float, shadow, rectangle and buffer, array, signed, unsigned, cube array, multisampled.
@@ -65,7 +74,7 @@ def flatten(name: str, folders: Iterable[Path], defines: Mapping[str, int | floa
 
 
 class Program:
-    """A linked program. `name` is its fragment shader's; vertex arrays that fit it are kept in `arrays`."""
+    """A linked program. `name` is its first file's; vertex arrays that fit it are kept in `arrays`."""
 
     def __init__(self, gpu: Gpu, name: str, glsl: Any, sources: Iterable[Source]) -> None:
         self.gpu, self.name, self.glsl = gpu, name, glsl
@@ -113,35 +122,31 @@ class ShaderLibrary:
         self._programs: dict[Any, Program] = {}
 
     def program(
-        self,
-        fragment: str | None,
-        vertex: str = "fullscreen.vert",
-        geometry: str | None = None,
-        defines: Mapping[str, int | float] | None = None,
-        folder: Path | None = None,
+        self, *files: str, defines: Mapping[str, int | float] | None = None, folder: Path | None = None
     ) -> Program:
-        """The program of these files with these defines; `folder` is searched before the package's shaders."""
+        """The program of these files with these defines, one a stage; without a .vert it covers the whole target.
+
+        `folder` is searched before the package's shaders.
+        """
         all_defines = {**self.gpu.defines, **(defines or {})}
-        key = (fragment, vertex, geometry, folder, tuple(sorted(all_defines.items())))
+        key = (files, folder, tuple(sorted(all_defines.items())))
         if key not in self._programs:
-            self._programs[key] = self._build(fragment, vertex, geometry, all_defines, folder)
+            self._programs[key] = self._build(files, all_defines, folder)
         return self._programs[key]
 
-    def _build(
-        self, fragment: str | None, vertex: str, geometry: str | None, defines: Mapping[str, Any], folder: Path | None
-    ) -> Program:
+    def _build(self, files: tuple[str, ...], defines: Mapping[str, Any], folder: Path | None) -> Program:
         import moderngl
 
         folders = [package_shaders()] if folder is None else [folder, package_shaders()]
-        files = {"vertex_shader": vertex, "geometry_shader": geometry, "fragment_shader": fragment}
-        sources = {stage: flatten(file, folders, defines) for stage, file in files.items() if file}
+        stages = {"vertex_shader": FULLSCREEN, **{STAGES[Path(file).suffix]: file for file in files}}
+        sources = {stage: flatten(file, folders, defines) for stage, file in stages.items()}
         texts: dict[str, Any] = {stage: source.text for stage, source in sources.items()}
         self.compiled += 1
         try:
             glsl = self.gpu.ctx.program(**texts)
         except moderngl.Error as error:
-            raise ShaderError(_locate(str(error), sources, fragment or vertex)) from error
-        return Program(self.gpu, fragment or vertex, glsl, sources.values())
+            raise ShaderError(_locate(str(error), sources, files[0])) from error
+        return Program(self.gpu, files[0], glsl, sources.values())
 
     def forget(self, key: Any) -> None:
         """Give the vertex arrays back that programs keep for `key`, which is going away."""

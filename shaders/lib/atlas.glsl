@@ -12,8 +12,13 @@ vec4 atlas_tile(Light light) {
     return vec4(vec2(on_layer % uint(TILES), on_layer / uint(TILES)) * edge, edge, 1u + tile / uint(TILES * TILES));
 }
 
-float atlas_visibility(sampler2DArrayShadow atlas, Light light, float size, float offset, vec3 position, vec3 normal) {
-    vec3 seen = shadow_lookup(light, position, normal, size, offset);
+// Clip position in the atlas of what has the clip position `clip` in the map.
+vec4 in_tile(vec4 clip, vec4 tile) {
+    return vec4(clip.xy * tile.z + (tile.xy * 2.0 + tile.z - 1.0) * clip.w, clip.zw);
+}
+
+float atlas_visibility(sampler2DArrayShadow atlas, Light light, Receiver receiver, float size) {
+    vec3 at = comparison(receiver, size);
     vec4 tile = atlas_tile(light);
-    return texture(atlas, vec4(tile.xy + map_uv(seen.xy, size) * tile.z, tile.w, seen.z));
+    return texture(atlas, vec4(tile.xy + at.xy / size * tile.z, tile.w, at.z));
 }

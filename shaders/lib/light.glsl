@@ -11,7 +11,7 @@ struct Light {
     vec3 z_axis;          // unit; where the light looks
     float tile;           // its tile in the atlas; below 0: a whole layer
     vec3 emission;
-    float unused;
+    float curve;          // c / (1 + c), c the cosine of the half cone angle: scales paraboloid maps
 };
 
 // One block of the light buffer. The first block's light 0 is the spotlight.

@@ -1,24 +1,95 @@
-// Shadow maps: where a light sees a point, and how far. Writer and readers share it. Planar maps over the light's cone,
-// reversed depth (lib/depth.glsl).
+// Shadow maps: where a light sees a point, and how far. Writer and readers share it.
+//
+// A planar map covers the light's cone by a perspective projection, with reversed depth along its axis (lib/depth.glsl).
+// A paraboloid map (Brabec et al. 2002), which can be as wide as the hemisphere, is the stereographic projection of the
+// directions: the cone's edge is the circle of radius 1, and the depth is near / distance. VPLs' maps are paraboloid
+// where VPL_PARABOLOID is 1; the spotlight's is where it is wider than WIDE_SPOT says, whatever those of the VPLs are.
 #include "lib/frame.glsl"
 #include "lib/light.glsl"
 
-// Clip position in the light's map.
-vec4 light_clip(Light light, vec3 position) {
+bool spot_paraboloid(Light light) {
+    return light.one_minus_cos > WIDE_SPOT;
+}
+
+// What the map's coordinates of a point at `d` from the light are divided by: its depth along the axis in a planar map.
+float planar_divisor(Light light, vec3 d) {
+    return dot(d, light.z_axis);
+}
+
+float paraboloid_divisor(Light light, vec3 d) {
+    return light.curve * (length(d) + dot(d, light.z_axis));
+}
+
+// Clip position in the light's planar map.
+vec4 planar_clip(Light light, vec3 position) {
     vec3 d = position - light.position;
-    return clip_position(vec2(dot(d, light.x_axis), dot(d, light.y_axis)), frame.near, dot(d, light.z_axis));
+    return clip_position(vec2(dot(d, light.x_axis), dot(d, light.y_axis)), frame.near, planar_divisor(light, d));
 }
 
-// xy: NDC in the light's map; z: depth to compare. The point is lifted off its face by `offset` texels of a map of `size`
-// texels, because a texel holds one depth for all of its footprint; no world units are involved.
-vec3 shadow_lookup(Light light, vec3 position, vec3 normal, float size, float offset) {
+// A point as a map knows it. slope: change of depth, a texel to the right and up, on the plane of the point's face.
+struct Receiver {
+    vec2 texel;  // in texels from the map's lower left corner
+    float depth;
+    vec2 slope;
+};
+
+// The point is lifted off its face by `offset` texels of the map of `size` texels: its depth and those in the map come
+// from different roundings. No world units are involved.
+vec3 lifted(Light light, vec3 from, vec3 normal, float size, float offset, float divisor) {
+    return from + normal * (2.0 * offset / size * light.tan_half * divisor);
+}
+
+// Distance of the light behind the plane of the face; where the plane goes through the light no light arrives, and a
+// millionth of the way to the point stands for 0.
+float plane_distance(vec3 d, vec3 normal) {
+    return min(dot(normal, d), -1e-6 * length(d));
+}
+
+Receiver planar_receiver(Light light, vec3 position, vec3 normal, float size, float offset) {
     vec3 from = position - light.position;
-    vec3 d = from + normal * (2.0 * offset / size * light.tan_half * dot(light.z_axis, from));
-    float w = max(dot(d, light.z_axis), frame.near);  // behind the near plane nothing was drawn, and cosines are 0
-    return vec3(dot(d, light.x_axis), dot(d, light.y_axis), frame.near) / w;
+    vec3 d = lifted(light, from, normal, size, offset, planar_divisor(light, from));
+    float w = max(planar_divisor(light, d), frame.near);  // behind the near plane nothing was drawn, and cosines are 0
+    vec2 n = vec2(dot(normal, light.x_axis), dot(normal, light.y_axis));
+    Receiver r;
+    r.texel = (vec2(dot(d, light.x_axis), dot(d, light.y_axis)) / w * 0.5 + 0.5) * size;
+    r.depth = frame.near / w;
+    // 1/w is linear in the map over a plane.
+    r.slope = n * (2.0 / size * frame.near * light.tan_half * light.tan_half / plane_distance(d, normal));
+    return r;
 }
 
-// Map coordinates in [0, 1], kept half a texel inside, so that a 2x2 comparison never leaves the map or tile.
-vec2 map_uv(vec2 ndc, float size) {
-    return clamp(ndc * 0.5 + 0.5, 0.5 / size, 1.0 - 0.5 / size);
+Receiver paraboloid_receiver(Light light, vec3 position, vec3 normal, float size, float offset) {
+    vec3 from = position - light.position;
+    vec3 d = lifted(light, from, normal, size, offset, paraboloid_divisor(light, from));
+    float inverse = inversesqrt(max(dot(d, d), TINY)), cosine = dot(d, light.z_axis) * inverse;
+    float h = plane_distance(d, normal), tan_quarter = light.curve * light.tan_half;
+    vec2 n = vec2(dot(normal, light.x_axis), dot(normal, light.y_axis)) * light.tan_half;
+    // Behind the light nothing was drawn, and cosines are 0.
+    vec2 ndc = vec2(dot(d, light.x_axis), dot(d, light.y_axis)) * (inverse / (light.curve * max(1.0 + cosine, 0.5)));
+    Receiver r;
+    r.texel = (ndc * 0.5 + 0.5) * size;
+    r.depth = frame.near * inverse;
+    // On a plane at distance h, 1/distance is dot(normal, direction) / h: this is its derivative.
+    r.slope = (n - ndc * (tan_quarter * (dot(normal, light.z_axis) + h * inverse)))
+            * (2.0 / size * frame.near * tan_quarter * (1.0 + cosine) / h);
+    return r;
 }
+
+// Where to compare, in texels, kept half a texel inside, so that a 2x2 comparison never leaves the map or tile; and
+// the depth to compare with: the nearest that the point's plane reaches in the four texels, or the point itself.
+vec3 comparison(Receiver r, float size) {
+    vec2 texel = clamp(r.texel, 0.5, size - 0.5), f = fract(texel - 0.5);
+    vec2 nearer = max(-f * r.slope, (1.0 - f) * r.slope);
+    return vec3(texel, r.depth + nearer.x + nearer.y);
+}
+
+Receiver SPOT_RECEIVER(Light light, vec3 position, vec3 normal, float size, float offset) {
+    if (spot_paraboloid(light)) return paraboloid_receiver(light, position, normal, size, offset);
+    return planar_receiver(light, position, normal, size, offset);
+}
+
+#if VPL_PARABOLOID
+#define VPL_RECEIVER paraboloid_receiver
+#else
+#define VPL_RECEIVER planar_receiver
+#endif

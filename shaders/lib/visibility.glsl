@@ -3,7 +3,8 @@
 #if HAS_SHADOWS
 #include "lib/atlas.glsl"
 layout(binding = UNIT_SHADOWS) uniform sampler2DArrayShadow shadows;
-#define VISIBILITY(light, kind) atlas_visibility(shadows, light, kind##_SIZE, kind##_OFFSET, position, normal)
+#define VISIBILITY(light, kind) \
+    atlas_visibility(shadows, light, kind##_RECEIVER(light, position, normal, kind##_SIZE, kind##_OFFSET), kind##_SIZE)
 #else
 #define VISIBILITY(light, kind) 1.0
 #endif

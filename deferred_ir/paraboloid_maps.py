@@ -1,0 +1,36 @@
+"""Drawing paraboloid maps: what is small in a map goes there as it is, the rest is split first.
+
+Between its corners a triangle's edges are straight in a map, while lines of the scene are curved in a paraboloid. The
+GPU splits edges (shaders/paraboloid.tesc), but doing so for every triangle and light would cost more than it is worth:
+clusters none of whose edges can bend by more than `bend` texels are drawn as they are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .frame import Frame
+from .gl import raw
+from .io import Io
+from .maps import MapParams
+from .typing import Bools
+
+FILES = ("paraboloid.frag", "paraboloid.vert")
+SPLIT = ("paraboloid.tesc", "paraboloid.tese")
+
+
+def draw(frame: Frame, io: Io, params: MapParams, records: np.ndarray, chosen: Bools, *, layered: bool) -> None:
+    """Draw the lights `chosen`, bool (n,), of the bound block, whose records (n,) are given; layered: into an atlas."""
+    gpu, clusters = io.gpu, frame.buffers.cluster_buffers.clusters
+    visible = clusters.visible(records, hemisphere=True) & chosen[:, None]
+    bent = clusters.bent(records, params.reach(records))
+    for side in range(5):  # behind the light, and the map's four
+        gpu.ctx.enable_direct(raw.CLIP_DISTANCE0 + side)
+    geometry = ["paraboloid.geom"] if layered and not gpu.layer_from_vertex else []
+    for split, share in ((False, visible & ~bent), (True, visible & bent)):
+        if share.any():
+            files = [*FILES, *(SPLIT if split else ()), *geometry]
+            program = io.program(*files, defines={"SPLIT": int(split), "BEND": float(params.bend)})
+            frame.buffers.draw_clusters(program, share, patches=split)
+    for side in range(5):
+        gpu.ctx.disable_direct(raw.CLIP_DISTANCE0 + side)

@@ -1,0 +1,27 @@
+// The scene as a light's paraboloid map sees it: triangles that are small in the map go there as they are, others to
+// paraboloid.tesc.
+#if LAYER_FROM_VERTEX && !SPLIT
+#extension GL_ARB_shader_viewport_layer_array : require
+#endif
+#include "lib/shadow.glsl"
+#if SPLIT
+flat out int light_of_corner;
+out vec3 corner;  // from the light
+#else
+#include "lib/paraboloid.glsl"
+#endif
+
+in int light_index;  // in its block; one an instance
+in vec3 position;
+
+void main() {
+    Light light = lights[light_index];
+    vec3 d = position - light.position;
+#if SPLIT
+    light_of_corner = light_index;
+    corner = d;
+#else
+    part.seen = d;
+    place(light, d);
+#endif
+}

@@ -6,6 +6,7 @@ I(w) = E_i cos(theta_y) inside a round cone.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -74,7 +75,7 @@ class Spotlight:
 
 def one_minus_cos(fov: float) -> float:
     """1 - cos(fov/2) for a full opening angle in degrees."""
-    return float(2 * np.sin(np.radians(fov) / 4) ** 2)
+    return 2 * math.sin(math.radians(fov) / 4) ** 2
 
 
 def frames(axes: Array) -> tuple[Array, Array]:
@@ -93,12 +94,19 @@ def frames(axes: Array) -> tuple[Array, Array]:
 def light_records(position: Array, axis: Array, emission: Array, *, fov: float, tile: Array | float) -> np.ndarray:
     """Pack lights with one cone angle `fov` (degrees) into LIGHT records, shape (n,). Inputs are (n, 3), tile (n,)."""
     records = np.zeros(len(position), dtype=LIGHT)
+    fill_records(records, position, axis, emission, fov=fov, tile=tile)
+    return records
+
+
+def fill_records(
+    records: np.ndarray, position: Array, axis: Array, emission: Array, *, fov: float, tile: Array | float
+) -> None:
+    """As `light_records`, into zeroed records (n,) that are there."""
     right, up = frames(axis)
-    tangent = np.tan(np.radians(fov) / 2)
+    half = math.radians(fov) / 2
+    tangent, cosine = math.tan(half), math.cos(half)
     records["position"], records["z_axis"], records["emission"] = position, axis, emission
     records["x_axis"], records["y_axis"] = right / tangent, up / tangent
     records["tan_half"], records["one_minus_cos"] = tangent, one_minus_cos(fov)
-    cosine = np.cos(np.radians(fov) / 2)
     records["curve"] = cosine / (1 + cosine)
     records["tile"] = tile
-    return records

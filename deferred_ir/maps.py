@@ -14,6 +14,7 @@ from .typing import Array, Bools
 
 WIDEST_PLANAR = 140.0
 """A spotlight wider than this, in degrees, gets a paraboloid map: the planar one has few texels for its middle."""
+WIDE = one_minus_cos(WIDEST_PLANAR)
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class MapParams:
         """For the shaders of writer and readers."""
         return {
             "VPL_PARABOLOID": int(self.projection == "paraboloid"),
-            "WIDE_SPOT": one_minus_cos(WIDEST_PLANAR),
+            "WIDE_SPOT": WIDE,
             "SPOT_SIZE": self.spot_size,
             "VPL_SIZE": self.vpl_size,
             "SPOT_OFFSET": float(self.spot_offset),
@@ -65,8 +66,8 @@ class MapParams:
 
     def paraboloid(self, records: np.ndarray) -> Bools:
         """Which lights' maps are paraboloids, bool (n,); records: LIGHT (n,)."""
-        wide = records["one_minus_cos"] > np.float32(one_minus_cos(WIDEST_PLANAR))
-        chosen: Bools = np.where(records["tile"] < 0, wide, self.projection == "paraboloid")
+        chosen: Bools = (records["tile"] >= 0) & (self.projection == "paraboloid")
+        chosen |= (records["tile"] < 0) & (records["one_minus_cos"] > WIDE)
         return chosen
 
     def reach(self, records: np.ndarray) -> Array:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from .frame import Frame
-from .gl import raw
 from .io import Io
 from .maps import MapParams
 from .typing import Bools
@@ -24,13 +23,11 @@ def draw(frame: Frame, io: Io, params: MapParams, records: np.ndarray, chosen: B
     gpu, clusters = io.gpu, frame.buffers.cluster_buffers.clusters
     visible = clusters.visible(records, hemisphere=True) & chosen[:, None]
     bent = clusters.bent(records, params.reach(records))
-    for side in range(5):  # behind the light, and the map's four
-        gpu.ctx.enable_direct(raw.CLIP_DISTANCE0 + side)
+    gpu.clip(5)  # behind the light, and the map's four sides
     geometry = ["paraboloid.geom"] if layered and not gpu.layer_from_vertex else []
     for split, share in ((False, visible & ~bent), (True, visible & bent)):
         if share.any():
             files = [*FILES, *(SPLIT if split else ()), *geometry]
             program = io.program(*files, defines={"SPLIT": int(split), "BEND": float(params.bend)})
             frame.buffers.draw_clusters(program, share, patches=split)
-    for side in range(5):
-        gpu.ctx.disable_direct(raw.CLIP_DISTANCE0 + side)
+    gpu.clip(0)

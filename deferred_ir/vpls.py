@@ -75,6 +75,8 @@ def cast(
         made.append(
             _land(tracer, tracer.lift(last.position[drawn], normal), lift_to_hemisphere(disc(square), normal), carried)
         )
+    if len(made) == 1:
+        return made[0]
     return Vpls(*(np.concatenate([getattr(part, f.name) for part in made]) for f in fields(Vpls)))
 
 

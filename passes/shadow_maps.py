@@ -13,7 +13,6 @@ from typing import Any, ClassVar
 
 from deferred_ir import paraboloid_maps
 from deferred_ir.frame import Frame
-from deferred_ir.gl import raw
 from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.io import Io
 from deferred_ir.lights import LIGHTS_PER_BLOCK
@@ -64,8 +63,6 @@ class ShadowMaps(Pass):
         gpu, lights = io.gpu, io["lights"]
         io.framebuffer.clear_depth()
         self.params.prepare(gpu)
-        for side in range(4):
-            gpu.ctx.enable_direct(raw.CLIP_DISTANCE0 + side)
         geometry = [] if gpu.layer_from_vertex else ["shadow_maps.geom"]
         program = io.program("depth.frag", "shadow_maps.vert", *geometry)
         total = len(lights.records)
@@ -75,6 +72,7 @@ class ShadowMaps(Pass):
             records = lights.records[start : start + LIGHTS_PER_BLOCK]
             curved = self.params.paraboloid(records)
             if not curved.all():
+                gpu.clip(4)
                 frame.buffers.draw_clusters(program, clusters.visible(records) & ~curved[:, None])
             if curved.any():
                 paraboloid_maps.draw(frame, io, self.params, records, curved, layered=True)

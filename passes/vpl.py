@@ -11,7 +11,7 @@ import numpy as np
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Buffer, Description, Output, Pass
 from deferred_ir.io import Io
-from deferred_ir.lights import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, light_records
+from deferred_ir.lights import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
 from deferred_ir.params import param
 from deferred_ir.sampling import Pattern, warn_unbalanced
 from deferred_ir.vpls import NONE, cast
@@ -50,13 +50,14 @@ class Vpl(Pass):
         light, p = frame.scene.spotlight, self.params
         shines = p.count > 0 and any(light.emission)
         vpls = cast(light, frame.tracer(), p.count, p.pattern, frame.seed, bounces=p.bounces) if shines else NONE
-        spot = light_records(
-            np.array([light.position]), light.axis[None], np.array([light.emission]), fov=light.fov, tile=SPOT_TILE
+        records = np.zeros(1 + len(vpls), LIGHT)
+        spot = np.array([light.position]), light.axis[None], np.array([light.emission])
+        fill_records(records[:1], *spot, fov=light.fov, tile=SPOT_TILE)
+        fill_records(
+            records[1:], vpls.position, vpls.normal, vpls.emission, fov=p.fov, tile=np.arange(len(vpls), dtype="f4")
         )
-        tiles = np.arange(len(vpls), dtype=np.float64)
-        records = light_records(vpls.position, vpls.normal, vpls.emission, fov=p.fov, tile=tiles)
-        records["clamp_squared"] = (p.clamp * frame.scene.geometry.diagonal) ** 2
-        io["lights"].write(np.concatenate([spot, records]))
+        records["clamp_squared"][1:] = (p.clamp * frame.scene.geometry.diagonal) ** 2
+        io["lights"].write(records)
         io.count("vpls_alive", len(vpls))
 
 

@@ -19,6 +19,7 @@ class Gpu:
         self.clip_control = "GL_ARB_clip_control" in extensions or self.ctx.version_code >= 450
         if self.clip_control:
             self.gl.ClipControl(raw.LOWER_LEFT, raw.ZERO_TO_ONE)
+        self._clipped = 0
         self._samplers: dict[tuple[bool, str | None, bool], Any] = {}
 
     @cached_property
@@ -52,10 +53,15 @@ class Gpu:
         """The state that each pass starts from: no tests, no clipping, no blending, all writes on."""
         ctx = self.ctx
         ctx.disable(ctx.DEPTH_TEST | ctx.CULL_FACE | ctx.BLEND)
-        for side in range(4):
-            ctx.disable_direct(raw.CLIP_DISTANCE0 + side)
+        self.clip(0)
         self.gl.DepthMask(1)
         self.gl.ColorMask(1, 1, 1, 1)
+
+    def clip(self, count: int) -> None:
+        """Clip by the first `count` of gl_ClipDistance, and by no other."""
+        for side in range(min(count, self._clipped), max(count, self._clipped)):
+            (self.ctx.enable_direct if count > side else self.ctx.disable_direct)(raw.CLIP_DISTANCE0 + side)
+        self._clipped = count
 
     def close(self) -> None:
         """Destroy the context and all that lives in it."""

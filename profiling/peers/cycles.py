@@ -1,0 +1,132 @@
+"""Blender's Cycles on the CPU, with its denoiser (Open Image Denoise), through the `bpy` wheel.
+
+Its light is the spotlight of docs/conventions.md: nodes give Cycles' point or disc light the same intensity. What
+differs is that a pixel is averaged over its area. One scene a process: Blender has one set of data.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.image_reading import read_radiance
+from deferred_ir.scene import Scene
+from deferred_ir.typing import Array
+
+from . import Rendered
+
+INSTALL = "bpy"
+
+LARGEST_SEED = 2**31 - 1
+
+
+def available() -> str | None:
+    """None if Cycles can be used here, else the reason why not."""
+    if importlib.util.find_spec("bpy") is None:
+        return "bpy is not installed (its wheels are for one Python version each)"
+    return None
+
+
+class Peer:
+    """Cycles with `scene` at time 0 loaded, for images of `size` (width, height)."""
+
+    own_light = False
+    """Whether the light is another than that of docs/conventions.md, so that only an own image can judge it."""
+
+    about: str
+
+    def __init__(self, scene: Scene, size: tuple[int, int], bounces: int) -> None:
+        from . import cycles_scene
+
+        with _silent():
+            import bpy
+
+            self._bpy: Any = bpy
+            bpy.ops.wm.read_factory_settings(use_empty=True)
+            cycles_scene.build(bpy, scene.at(0.0))
+            _settings(bpy.context.scene, size, bounces)
+        self.about = f"Cycles of Blender {bpy.app.version_string}, CPU"
+        self.render(1, 0)  # builds its BVH and the denoiser's network
+
+    def render(self, spp: int, seed: int, *, denoise: bool = True) -> Rendered:
+        """An image of `spp` paths a pixel, denoised or not.
+
+        `ms` holds all of Blender's render operator: bringing its scene to Cycles (what did not change stays there),
+        tracing, denoising and handing over the image; not the file through which the image leaves Blender.
+        """
+        view = self._bpy.context.scene
+        view.cycles.samples, view.cycles.seed = spp, seed % LARGEST_SEED
+        view.cycles.use_denoising = denoise
+        with _silent():
+            start = time.perf_counter()
+            self._bpy.ops.render.render()
+            ms = (time.perf_counter() - start) * 1e3
+            radiance = self._pixels()
+        return Rendered(radiance, ms)
+
+    def _pixels(self) -> Array:
+        """Blender gives no access to the pixels of a render result but by a file."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "image.exr"
+            self._bpy.data.images["Render Result"].save_render(str(path))
+            return read_radiance(path).astype(np.float32)
+
+
+def _settings(view: Any, size: tuple[int, int], bounces: int) -> None:
+    """Direct light and `bounces` diffuse bounces, a box filter over the pixel, nothing clamped or cut short."""
+    render, cycles = view.render, view.cycles
+    render.engine = "CYCLES"
+    render.resolution_x, render.resolution_y = size
+    render.resolution_percentage = 100
+    render.use_persistent_data = True
+    render.use_compositing = render.use_sequencer = False
+    render.film_transparent = False
+    render.dither_intensity = 0
+    render.image_settings.file_format = "OPEN_EXR"
+    render.image_settings.color_mode = "RGB"
+    render.image_settings.color_depth = "32"
+    render.image_settings.exr_codec = "NONE"
+    view.view_settings.view_transform = "Raw"
+
+    cycles.device = "CPU"
+    cycles.max_bounces = cycles.diffuse_bounces = bounces
+    cycles.glossy_bounces = cycles.transmission_bounces = cycles.volume_bounces = 0
+    cycles.caustics_reflective = cycles.caustics_refractive = False
+    cycles.use_fast_gi = cycles.use_guiding = False
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
+    cycles.light_sampling_threshold = 0
+    cycles.use_adaptive_sampling = False
+    cycles.use_auto_tile = False
+    cycles.use_light_tree = False  # there is one light
+    cycles.pixel_filter_type = "BOX"
+    # Of patterns, prefilters and qualities these had the least error x time on cornell at 256x256 and 4 spp.
+    cycles.sampling_pattern = "BLUE_NOISE"
+    cycles.denoiser = "OPENIMAGEDENOISE"
+    cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
+    cycles.denoising_prefilter = "FAST"
+    cycles.denoising_quality = "HIGH"
+    cycles.denoising_use_gpu = False
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep off the standard output what Blender prints, such as a warning that there is no CUDA."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    null = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(null)
+        os.close(kept)

@@ -18,6 +18,7 @@ def svg(groups: Sequence[Group], title: str, peers: Sequence[Rung] = ()) -> str:
     import matplotlib as mpl
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     figure = Figure(figsize=(7, 4.6), layout="constrained")
     FigureCanvasSVG(figure)
@@ -44,6 +45,10 @@ def svg(groups: Sequence[Group], title: str, peers: Sequence[Rung] = ()) -> str:
     panel.margins(0.08)
     panel.set_xscale("log")
     panel.set_yscale("log")
+    for axis in (panel.xaxis, panel.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
     panel.set_xlabel("frame time [ms]")
     panel.set_ylabel(f"relMSE (trimmed{', no edge pixels' if peers else ''})")
     panel.set_title(f"{title}: error against run time, numbers are VPLs{', of peers paths' if peers else ''}")

@@ -18,7 +18,20 @@ sys.path.insert(0, str(Path(__file__).parent))
 from pages import ROOT
 from system import BROWSERS
 
-SWEEP = ["profile", "cornell", "--graphs", "forward,deferred", "--vpls", "16,64", "--seeds", "2", "--size", "128x128"]
+SWEEP = [
+    "profile",
+    "cornell",
+    "--graphs",
+    "forward,deferred",
+    "--vpls",
+    "16,64",
+    "--seeds",
+    "2",
+    "--size",
+    "128x128",
+    "--peers",
+    "none",
+]
 FOLDER = ROOT / "out" / "look"
 PICTURE = ROOT / "out" / "report.png"
 WIDTH, HEIGHT = 1100, 4000

@@ -27,6 +27,12 @@ class MapParams:
         0.1, lo=0.0, hi=16.0, doc="How far a point is lifted off its face before the spotlight's map is asked, texels."
     )
     vpl_offset: float = param(0.25, lo=0.0, hi=16.0, doc="The same before a VPL's map is asked, texels.")
+    spot_kernel: float = param(
+        1.0, lo=1.0, hi=64.0, doc="Filter of the spotlight's map: width in texels. 1: the hardware's 2x2 alone."
+    )
+    vpl_kernel: float = param(1.0, lo=1.0, hi=64.0, doc="The same of a VPL's map.")
+    spot_taps: int = param(16, lo=1, hi=256, doc="Comparisons that a wider filter spreads over the spotlight's map.")
+    vpl_taps: int = param(8, lo=1, hi=256, doc="The same over a VPL's map.")
     projection: Literal["perspective", "paraboloid"] = param(
         "perspective", doc="Of the VPLs' maps. The spotlight's is a paraboloid where it is wider than 140 degrees."
     )
@@ -62,6 +68,10 @@ class MapParams:
             "VPL_SIZE": self.vpl_size,
             "SPOT_OFFSET": float(self.spot_offset),
             "VPL_OFFSET": float(self.vpl_offset),
+            "SPOT_KERNEL": float(self.spot_kernel),
+            "VPL_KERNEL": float(self.vpl_kernel),
+            "SPOT_TAPS": self.spot_taps,
+            "VPL_TAPS": self.vpl_taps,
         }
 
     def paraboloid(self, records: np.ndarray) -> Bools:

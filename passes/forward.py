@@ -56,8 +56,8 @@ class Forward(Pass):
         lights.bind_uniform(1, 0)
         if io["spot"]:
             io["spot"][0].bind(FIRST_MAP, compare)
-        frame.buffers.draw(io.program("forward.frag", "scene.vert", defines={"SPOT": 1, **defines}))
-        program = io.program("forward.frag", "scene.vert", defines={"SPOT": 0, **defines})
+        frame.buffers.draw(io.program("forward.frag", "scene.vert", defines={"DIRECT": 1, **defines}))
+        program = io.program("forward.frag", "scene.vert", defines={"DIRECT": 0, **defines})
         number = 1  # of the light; a group must not straddle two blocks
         while number < len(lights.records):
             block, first = divmod(number, LIGHTS_PER_BLOCK)

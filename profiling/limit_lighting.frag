@@ -9,6 +9,10 @@ layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 uniform int first;  // light of this block to start with; 1 where light 0 is the spotlight
 uniform int count;  // lights of this block
 
+#define SEEN(light, kind) \
+    compared(shadows, atlas_tile(light), kind##_SIZE, \
+             comparison(kind##_RECEIVER(light, position, vec3(0.0), kind##_SIZE, 0.0), kind##_SIZE))
+
 in vec2 ndc;
 layout(location = 0) out vec4 radiance;  // how many lights reach the pixel
 
@@ -20,8 +24,7 @@ void main() {
     }
     vec3 position = unproject(ndc, d);
     float seen = 0.0;
-    if (first == 1) seen = atlas_visibility(shadows, lights[0], SPOT_RECEIVER(lights[0], position, vec3(0.0), SPOT_SIZE, 0.0), SPOT_SIZE);
-    for (int i = first; i < count; ++i)
-        seen += atlas_visibility(shadows, lights[i], VPL_RECEIVER(lights[i], position, vec3(0.0), VPL_SIZE, 0.0), VPL_SIZE);
+    if (first == 1) seen = SEEN(lights[0], SPOT);
+    for (int i = first; i < count; ++i) seen += SEEN(lights[i], VPL);
     radiance = vec4(seen);
 }

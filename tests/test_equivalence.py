@@ -110,10 +110,11 @@ def test_on_built_in_scenes(renderer, name, projection):
 
 
 @pytest.mark.parametrize("fov", [139.0, 141.0, 179.0])
-def test_with_a_wide_spotlight(renderer, fov):
+@pytest.mark.parametrize("kernel", [1.0, 9.0])
+def test_with_a_wide_spotlight(renderer, fov, kernel):
     scene = scene_named("room")
     scene = replace(scene, spotlight=replace(scene.spotlight, fov=fov))
-    assert_equal(*both(renderer, scene), hit("room", scene))
+    assert_equal(*both(renderer, scene, {"shadow_maps.spot_kernel": kernel}), hit("room", scene))
 
 
 def test_on_albedos_that_are_not_exact_in_8_bits(renderer, tmp_path):
@@ -139,6 +140,10 @@ OPTIONS = [
     {"shadow_maps.projection": "paraboloid", "vpl.fov": 179.9},
     {"shadow_maps.projection": "paraboloid", "vpl.fov": 60.0, "shadow_maps.bend": 0.25},
     {"shadow_maps.projection": "paraboloid", "shadow_maps.cull": "front", "shadow_maps.vpl_size": 100},
+    {"shadow_maps.spot_kernel": 7.0},
+    {"shadow_maps.vpl_kernel": 5.0},
+    {"shadow_maps.vpl_kernel": 12.0, "shadow_maps.vpl_taps": 20, "shadow_maps.vpl_size": 32},
+    {"shadow_maps.vpl_kernel": 9.0, "shadow_maps.projection": "paraboloid", "vpl.fov": 179.9},
     {"vpl.fov": 60.0},
     {"vpl.fov": 175.0},
     {"vpl.clamp": 0.0},

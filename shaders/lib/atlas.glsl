@@ -17,8 +17,10 @@ vec4 in_tile(vec4 clip, vec4 tile) {
     return vec4(clip.xy * tile.z + (tile.xy * 2.0 + tile.z - 1.0) * clip.w, clip.zw);
 }
 
-float atlas_visibility(sampler2DArrayShadow atlas, Light light, Receiver receiver, float size) {
-    vec3 at = comparison(receiver, size);
-    vec4 tile = atlas_tile(light);
+// For lib/filter.glsl: the sampler, a light's place in it, and a comparison of 2x2 texels of the map.
+#define MAP sampler2DArrayShadow
+#define map_place atlas_tile
+
+float compared(MAP atlas, vec4 tile, float size, vec3 at) {
     return texture(atlas, vec4(tile.xy + at.xy / size * tile.z, tile.w, at.z));
 }

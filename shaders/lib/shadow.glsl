@@ -27,10 +27,12 @@ vec4 planar_clip(Light light, vec3 position) {
 }
 
 // A point as a map knows it. slope: change of depth, a texel to the right and up, on the plane of the point's face.
+// bend: what makes it curved in a paraboloid map (see `comparison`); 0 in a planar one.
 struct Receiver {
     vec2 texel;  // in texels from the map's lower left corner
     float depth;
     vec2 slope;
+    vec4 bend;
 };
 
 // The point is lifted off its face by `offset` texels of the map of `size` texels: its depth and those in the map come
@@ -55,6 +57,7 @@ Receiver planar_receiver(Light light, vec3 position, vec3 normal, float size, fl
     r.depth = frame.near / w;
     // 1/w is linear in the map over a plane.
     r.slope = n * (2.0 / size * frame.near * light.tan_half * light.tan_half / plane_distance(d, normal));
+    r.bend = vec4(0.0);
     return r;
 }
 
@@ -72,15 +75,37 @@ Receiver paraboloid_receiver(Light light, vec3 position, vec3 normal, float size
     // On a plane at distance h, 1/distance is dot(normal, direction) / h: this is its derivative.
     r.slope = (n - ndc * (tan_quarter * (dot(normal, light.z_axis) + h * inverse)))
             * (2.0 / size * frame.near * tan_quarter * (1.0 + cosine) / h);
+    float step = 2.0 / size * tan_quarter, square = 0.5 * (1.0 + cosine) * step * step;
+    r.bend = vec4(ndc * (tan_quarter * step * (1.0 + cosine)), square,
+                  square * frame.near * (dot(normal, light.z_axis) / h + inverse));
     return r;
 }
 
-// Where to compare, in texels, kept half a texel inside, so that a 2x2 comparison never leaves the map or tile; and
-// the depth to compare with: the nearest that the point's plane reaches in the four texels, or the point itself.
+// The depth to compare with: the nearest that the point's plane reaches in the four texels about `texel`, where it has
+// `depth` and `slope`; never farther than the point itself.
+vec3 nearest_of_four(Receiver r, vec2 texel, float depth, vec2 slope) {
+    vec2 f = fract(texel - 0.5), nearer = max(-f * slope, (1.0 - f) * slope);
+    return vec3(texel, max(r.depth, depth + nearer.x + nearer.y));
+}
+
+// Where to compare, in texels, kept half a texel inside, so that a 2x2 comparison never leaves the map or tile; and the
+// depth to compare with.
 vec3 comparison(Receiver r, float size) {
-    vec2 texel = clamp(r.texel, 0.5, size - 0.5), f = fract(texel - 0.5);
-    vec2 nearer = max(-f * r.slope, (1.0 - f) * r.slope);
-    return vec3(texel, r.depth + nearer.x + nearer.y);
+    return nearest_of_four(r, clamp(r.texel, 0.5, size - 0.5), r.depth, r.slope);
+}
+
+// The same `offset` texels away. In a planar map 1/w is linear on the point's plane. In a paraboloid map coordinates are
+// tangents of half the angle, and 1/distance is a quadratic in them over another; beyond the disc lies what the light
+// does not shine on.
+vec3 comparison(Receiver r, float size, vec2 offset) {
+    vec2 texel = r.texel + offset, ndc = texel * (2.0 / size) - 1.0;
+    if (r.bend.z > 0.0) texel -= ndc * (1.0 - min(inversesqrt(max(dot(ndc, ndc), TINY)), 1.0)) * (0.5 * size);
+    texel = clamp(texel, 0.5, size - 0.5);
+    vec2 o = texel - r.texel;
+    float divisor = 1.0 + dot(r.bend.xy, o) + r.bend.z * dot(o, o);
+    float rise = (dot(r.slope, o) - r.bend.w * dot(o, o)) / divisor;
+    vec2 slope = (r.slope - 2.0 * r.bend.w * o - rise * (r.bend.xy + 2.0 * r.bend.z * o)) / divisor;
+    return nearest_of_four(r, texel, r.depth + rise, slope);
 }
 
 Receiver SPOT_RECEIVER(Light light, vec3 position, vec3 normal, float size, float offset) {

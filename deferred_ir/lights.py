@@ -22,7 +22,7 @@ LIGHT = np.dtype(
         ("x_axis", "f4", 3),  # right and up, divided by tan(half angle): NDC = dot(d, axis) / dot(d, z)
         ("tan_half", "f4"),
         ("y_axis", "f4", 3),
-        ("clamp_squared", "f4"),  # of VPLs: 1/d^2 is taken as 1/max(d^2, this)
+        ("clamp_squared", "f4"),  # of VPLs: 1/d^2 is taken as 1/max(d^2, this); of the spotlight: radius of its disc
         ("z_axis", "f4", 3),  # unit; where the light looks
         ("tile", "f4"),  # number of its tile in the atlas; the spotlight's (SPOT_TILE) is a whole layer
         ("emission", "f4", 3),
@@ -110,3 +110,8 @@ def fill_records(
     records["tan_half"], records["one_minus_cos"] = tangent, one_minus_cos(fov)
     records["curve"] = cosine / (1 + cosine)
     records["tile"] = tile
+
+
+def is_disc(records: np.ndarray) -> bool:
+    """Whether the spotlight, the first of the LIGHT records (n,), has a radius."""
+    return bool(records["clamp_squared"][0] > 0)

@@ -33,6 +33,11 @@ class MapParams:
     vpl_kernel: float = param(1.0, lo=1.0, hi=64.0, doc="The same of a VPL's map.")
     spot_taps: int = param(16, lo=1, hi=256, doc="Comparisons that a wider filter spreads over the spotlight's map.")
     vpl_taps: int = param(8, lo=1, hi=256, doc="The same over a VPL's map.")
+    soft: Literal["pcss", "off"] = param(
+        "pcss", doc="Shadows of a spotlight with a radius: percentage-closer soft shadows, or hard ones."
+    )
+    search_taps: int = param(16, lo=1, hi=256, doc="Soft shadows: depths read in each of two searches for blockers.")
+    soft_taps: int = param(32, lo=1, hi=256, doc="Soft shadows: comparisons spread over the penumbra.")
     projection: Literal["perspective", "paraboloid"] = param(
         "perspective", doc="Of the VPLs' maps. The spotlight's is a paraboloid where it is wider than 140 degrees."
     )
@@ -72,6 +77,9 @@ class MapParams:
             "VPL_KERNEL": float(self.vpl_kernel),
             "SPOT_TAPS": self.spot_taps,
             "VPL_TAPS": self.vpl_taps,
+            "SOFT": int(self.soft == "pcss"),
+            "SEARCH_TAPS": self.search_taps,
+            "SOFT_TAPS": self.soft_taps,
         }
 
     def paraboloid(self, records: np.ndarray) -> Bools:

@@ -13,11 +13,11 @@ from typing import ClassVar
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
 from deferred_ir.io import Io
-from deferred_ir.lights import LIGHTS_PER_BLOCK
+from deferred_ir.lights import LIGHTS_PER_BLOCK, is_disc
 from deferred_ir.params import param
 
 FIRST_MAP = 1
-"""Texture unit of the first depth map; unit 0 holds the primitives."""
+"""Texture unit of the first depth map; unit 0 holds the primitives, FIRST_MAP + 1 the spotlight's once more."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class Forward(Pass):
         "primitives": Input("face that shows, plus one", format="r32ui"),
         "depth": Input("depth of that face", format="depth32f", attach=True),
         "spot": Input("the spotlight's map", format="depth32f", optional=True),
+        "blockers": Input("the same: what hides a part of its disc", format="depth32f", optional=True),
         "vpls": Input("the VPLs' maps", format="depth32f", optional=True),
     }
 
@@ -51,13 +52,24 @@ class Forward(Pass):
         ctx.enable(ctx.DEPTH_TEST | ctx.BLEND)
         ctx.depth_func, ctx.blend_func = "==", (ctx.ONE, ctx.ONE)
         io.gpu.gl.DepthMask(0)
-        defines = {"UNIT_MAPS": FIRST_MAP, "LIGHTS_PER_DRAW": group, **frame.buffers.defines}
+        defines = {
+            "UNIT_MAPS": FIRST_MAP,
+            "UNIT_BLOCKERS": FIRST_MAP + 1,
+            "LIGHTS_PER_DRAW": group,
+            **frame.buffers.defines,
+        }
         compare = io.gpu.sampler(linear=True, compare=">=")
         lights.bind_uniform(1, 0)
         if io["spot"]:
             io["spot"][0].bind(FIRST_MAP, compare)
-        frame.buffers.draw(io.program("forward.frag", "scene.vert", defines={"DIRECT": 1, **defines}))
-        program = io.program("forward.frag", "scene.vert", defines={"DIRECT": 0, **defines})
+        if io["blockers"]:
+            io["blockers"][0].bind(FIRST_MAP + 1, io.gpu.sampler(linear=False))
+        frame.buffers.draw(
+            io.program(
+                "forward.frag", "scene.vert", defines={"DIRECT": 1, "DISC": int(is_disc(lights.records)), **defines}
+            )
+        )
+        program = io.program("forward.frag", "scene.vert", defines={"DIRECT": 0, "DISC": 0, **defines})
         number = 1  # of the light; a group must not straddle two blocks
         while number < len(lights.records):
             block, first = divmod(number, LIGHTS_PER_BLOCK)

@@ -12,7 +12,7 @@ from typing import ClassVar
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
 from deferred_ir.io import Io
-from deferred_ir.lights import LIGHTS_PER_BLOCK
+from deferred_ir.lights import LIGHTS_PER_BLOCK, is_disc
 
 
 class Lighting(Pass):
@@ -24,6 +24,7 @@ class Lighting(Pass):
         "normals": Input("shading and geometric normal", format="rgba16"),
         "albedo": Input("reflectance", format="rgba16f"),
         "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
+        "blockers": Input("the same maps: what hides a part of the spotlight's disc", format="depth32f", optional=True),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
@@ -35,7 +36,7 @@ class Lighting(Pass):
         """One fullscreen draw a block of lights."""
         del frame
         ctx, lights = io.gpu.ctx, io["lights"]
-        program = io.program("lighting.frag")
+        program = io.program("lighting.frag", defines={"DISC": int(is_disc(lights.records))})
         ctx.blend_func = ctx.ONE, ctx.ONE
         for start in range(0, len(lights.records), LIGHTS_PER_BLOCK):
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)

@@ -56,6 +56,7 @@ class Vpl(Pass):
         fill_records(
             records[1:], vpls.position, vpls.normal, vpls.emission, fov=p.fov, tile=np.arange(len(vpls), dtype="f4")
         )
+        records["clamp_squared"][0] = light.radius
         records["clamp_squared"][1:] = (p.clamp * frame.scene.geometry.diagonal) ** 2
         io["lights"].write(records)
         io.count("vpls_alive", len(vpls))

@@ -21,8 +21,8 @@ def arguments(doc: str | None, output: bool = True) -> argparse.ArgumentParser:
 
 
 @contextmanager
-def panels(names: Iterable[str], path: Path, y_label: str, share_y: bool = False) -> Iterator[list[Any]]:
-    """Matplotlib axes in a row, one for each name, with grid and legend; written as SVG at the end."""
+def panels(names: Iterable[str], path: Path, y_label: str = "", share_y: bool = False) -> Iterator[list[Any]]:
+    """Matplotlib axes in a row, one for each name; written as SVG at the end, lines with a grid and a legend."""
     import matplotlib as mpl
 
     mpl.use("svg")
@@ -34,8 +34,9 @@ def panels(names: Iterable[str], path: Path, y_label: str, share_y: bool = False
     yield list(axes[0])
     for panel, title in zip(axes[0], titles, strict=True):
         panel.set_title(title)
-        panel.grid(alpha=0.3)
-        panel.legend(fontsize=7)
+        if panel.get_legend_handles_labels()[0]:
+            panel.grid(alpha=0.3)
+            panel.legend(fontsize=7)
     axes[0][0].set_ylabel(y_label)
     figure.tight_layout()
     write_whole(path, lambda part: figure.savefig(part, format="svg", metadata={"Date": None}))

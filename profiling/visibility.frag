@@ -40,10 +40,10 @@ void main() {
     float visible;
     if (spotlight) {
         irradiance = spot_irradiance(lights[0], position, normal, shading_normal);
-        visible = VISIBILITY(lights[0], SPOT);
+        visible = SPOT_VISIBILITY(lights[0]);
     } else {
         irradiance = vpl_irradiance(lights[i], position, normal, shading_normal);
-        visible = VISIBILITY(lights[i], VPL);
+        visible = VPL_VISIBILITY(lights[i]);
     }
     pairs = vec4(number, visible, dot(irradiance, vec3(0.2126, 0.7152, 0.0722)), d);
     facing = vec4(normal, 0.0);

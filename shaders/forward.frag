@@ -4,12 +4,15 @@
 #include "lib/light.glsl"
 #if HAS_SPOT || HAS_VPLS
 #include "lib/plain.glsl"
-#include "lib/filter.glsl"
+#include "lib/soft.glsl"
 #endif
 
 layout(binding = UNIT_PRIMITIVES) uniform usampler2D primitives;
 #if DIRECT && HAS_SPOT
 layout(binding = UNIT_MAPS) uniform sampler2DShadow spot;
+#if HAS_BLOCKERS && SOFT && DISC
+layout(binding = UNIT_BLOCKERS) uniform sampler2D blockers;
+#endif
 #elif !DIRECT && HAS_VPLS
 layout(binding = UNIT_MAPS) uniform sampler2DShadow vpls[LIGHTS_PER_DRAW];
 #endif
@@ -26,15 +29,17 @@ void main() {
     vec3 irradiance = vec3(0.0);
 #if DIRECT
     irradiance = spot_irradiance(lights[0], s.position, s.normal, s.shading_normal);
-#if HAS_SPOT
-    irradiance *= FILTERED(spot, lights[0], SPOT, s.position, s.normal);
+#if HAS_SPOT && HAS_BLOCKERS && SOFT && DISC
+    irradiance *= spot_visibility(spot, blockers, lights[0], s.position, s.normal);
+#elif HAS_SPOT
+    irradiance *= spot_visibility(spot, lights[0], s.position, s.normal);
 #endif
 #else
     for (int i = 0; i < LIGHTS_PER_DRAW; ++i) {
         if (i >= count) break;
         vec3 arriving = vpl_irradiance(lights[first + i], s.position, s.normal, s.shading_normal);
 #if HAS_VPLS
-        arriving *= FILTERED(vpls[i], lights[first + i], VPL, s.position, s.normal);
+        arriving *= vpl_visibility(vpls[i], lights[first + i], s.position, s.normal);
 #endif
         irradiance += arriving;
     }

@@ -26,9 +26,9 @@ void main() {
     vec3 irradiance = vec3(0.0);
     if (first == 1)
         irradiance = spot_irradiance(lights[0], position, normal, shading_normal)
-                   * VISIBILITY(lights[0], SPOT);
+                   * SPOT_VISIBILITY(lights[0]);
     for (int i = first; i < count; ++i)
         irradiance += vpl_irradiance(lights[i], position, normal, shading_normal)
-                    * VISIBILITY(lights[i], VPL);
+                    * VPL_VISIBILITY(lights[i]);
     radiance = vec4(texelFetch(albedo, pixel, 0).rgb * irradiance * INVERSE_PI, 1.0);
 }

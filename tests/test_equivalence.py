@@ -117,6 +117,23 @@ def test_with_a_wide_spotlight(renderer, fov, kernel):
     assert_equal(*both(renderer, scene, {"shadow_maps.spot_kernel": kernel}), hit("room", scene))
 
 
+@pytest.mark.parametrize("fov", [90.0, 150.0])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"shadow_maps.soft": "off"},
+        {"shadow_maps.search_taps": 5, "shadow_maps.soft_taps": 100, "shadow_maps.spot_size": 300},
+        {"shadow_maps.spot_kernel": 9.0},
+    ],
+    ids=str,
+)
+def test_with_a_disc_for_a_spotlight(renderer, fov, settings):
+    scene = scene_named("room")
+    scene = replace(scene, spotlight=replace(scene.spotlight, fov=fov, radius=0.15))
+    assert_equal(*both(renderer, scene, settings), hit("room", scene))
+
+
 def test_on_albedos_that_are_not_exact_in_8_bits(renderer, tmp_path):
     (tmp_path / "odd.obj").write_text(f"mtllib odd.mtl\n{ODD}")
     (tmp_path / "odd.mtl").write_text(ODD_MATERIALS)

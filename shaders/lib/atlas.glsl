@@ -17,10 +17,16 @@ vec4 in_tile(vec4 clip, vec4 tile) {
     return vec4(clip.xy * tile.z + (tile.xy * 2.0 + tile.z - 1.0) * clip.w, clip.zw);
 }
 
-// For lib/filter.glsl: the sampler, a light's place in it, and a comparison of 2x2 texels of the map.
+// For lib/filter.glsl: the sampler, a light's place in it, and a comparison of 2x2 texels of the map. For lib/soft.glsl:
+// the atlas without comparison, and a texel of the spotlight's map.
 #define MAP sampler2DArrayShadow
+#define DEPTHS sampler2DArray
 #define map_place atlas_tile
 
 float compared(MAP atlas, vec4 tile, float size, vec3 at) {
     return texture(atlas, vec4(tile.xy + at.xy / size * tile.z, tile.w, at.z));
+}
+
+float spot_depth(DEPTHS atlas, ivec2 texel) {
+    return texelFetch(atlas, ivec3(texel, 0), 0).r;
 }

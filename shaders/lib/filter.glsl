@@ -25,7 +25,12 @@ float filtered(MAP map, Light light, Receiver receiver, float size, float kernel
     return lit / float(taps);
 }
 
-// Of the fragment's `position` and geometric `normal`; kind: SPOT or VPL.
-#define FILTERED(map, light, kind, position, normal) \
-    filtered(map, light, kind##_RECEIVER(light, position, normal, kind##_SIZE, kind##_OFFSET), \
-             kind##_SIZE, kind##_KERNEL, kind##_TAPS)
+float vpl_visibility(MAP map, Light light, vec3 position, vec3 normal) {
+    Receiver receiver = VPL_RECEIVER(light, position, normal, VPL_SIZE, VPL_OFFSET);
+    return filtered(map, light, receiver, VPL_SIZE, VPL_KERNEL, VPL_TAPS);
+}
+
+float spot_visibility(MAP map, Light light, vec3 position, vec3 normal) {
+    Receiver receiver = SPOT_RECEIVER(light, position, normal, SPOT_SIZE, SPOT_OFFSET);
+    return filtered(map, light, receiver, SPOT_SIZE, SPOT_KERNEL, SPOT_TAPS);
+}

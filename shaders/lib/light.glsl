@@ -7,7 +7,7 @@ struct Light {
     vec3 x_axis;          // of the light's map, divided by tan_half
     float tan_half;
     vec3 y_axis;
-    float clamp_squared;  // VPLs: 1/d^2 is taken as 1/max(d^2, this)
+    float clamp_squared;  // VPLs: 1/d^2 is taken as 1/max(d^2, this); the spotlight: see disc_radius
     vec3 z_axis;          // unit; where the light looks
     float tile;           // its tile in the atlas; below 0: a whole layer
     vec3 emission;
@@ -16,6 +16,10 @@ struct Light {
 
 // One block of the light buffer. The first block's light 0 is the spotlight.
 layout(std140, binding = 1) uniform Lights { Light lights[LIGHTS_PER_BLOCK]; };
+
+float disc_radius(Light spotlight) {
+    return spotlight.clamp_squared;
+}
 
 const float INVERSE_PI = 0.318309886;
 const float TINY = 1e-37;  // keeps a squared distance off 0, where position and light coincide and the cosines are 0

@@ -27,7 +27,7 @@ vec4 planar_clip(Light light, vec3 position) {
 }
 
 // A point as a map knows it. slope: change of depth, a texel to the right and up, on the plane of the point's face.
-// bend: what makes it curved in a paraboloid map (see `comparison`); 0 in a planar one.
+// bend: what makes it curved in a paraboloid map (see `receiver_plane`); 0 in a planar one.
 struct Receiver {
     vec2 texel;  // in texels from the map's lower left corner
     float depth;
@@ -94,18 +94,23 @@ vec3 comparison(Receiver r, float size) {
     return nearest_of_four(r, clamp(r.texel, 0.5, size - 0.5), r.depth, r.slope);
 }
 
-// The same `offset` texels away. In a planar map 1/w is linear on the point's plane. In a paraboloid map coordinates are
-// tangents of half the angle, and 1/distance is a quadratic in them over another; beyond the disc lies what the light
-// does not shine on.
+// The plane of the receiver's face `offset` texels away: x, y the slope there, z the depth. In a planar map 1/w is linear
+// on a plane. In a paraboloid map coordinates are tangents of half the angle, and 1/distance is a quadratic in them over
+// another.
+vec3 receiver_plane(Receiver r, vec2 offset) {
+    float square = dot(offset, offset), divisor = 1.0 + dot(r.bend.xy, offset) + r.bend.z * square;
+    float rise = (dot(r.slope, offset) - r.bend.w * square) / divisor;
+    vec2 slope = (r.slope - 2.0 * r.bend.w * offset - rise * (r.bend.xy + 2.0 * r.bend.z * offset)) / divisor;
+    return vec3(slope, r.depth + rise);
+}
+
+// The same `offset` texels away. Beyond the disc of a paraboloid map lies what the light does not shine on.
 vec3 comparison(Receiver r, float size, vec2 offset) {
     vec2 texel = r.texel + offset, ndc = texel * (2.0 / size) - 1.0;
     if (r.bend.z > 0.0) texel -= ndc * (1.0 - min(inversesqrt(max(dot(ndc, ndc), TINY)), 1.0)) * (0.5 * size);
     texel = clamp(texel, 0.5, size - 0.5);
-    vec2 o = texel - r.texel;
-    float divisor = 1.0 + dot(r.bend.xy, o) + r.bend.z * dot(o, o);
-    float rise = (dot(r.slope, o) - r.bend.w * dot(o, o)) / divisor;
-    vec2 slope = (r.slope - 2.0 * r.bend.w * o - rise * (r.bend.xy + 2.0 * r.bend.z * o)) / divisor;
-    return nearest_of_four(r, texel, r.depth + rise, slope);
+    vec3 plane = receiver_plane(r, texel - r.texel);
+    return nearest_of_four(r, texel, plane.z, plane.xy);
 }
 
 Receiver SPOT_RECEIVER(Light light, vec3 position, vec3 normal, float size, float offset) {

@@ -8,7 +8,7 @@ import numpy as np
 
 from .typing import Array, Bools, Ints
 
-CLUSTER = 256
+CLUSTER = 64
 """Most triangles in a cluster."""
 ROUNDING = 2.0**-18
 """Slack of the test against a plane, relative to the terms it adds: 64 roundings, this test's and the shader's."""

@@ -1,42 +1,54 @@
-// How finely a triangle has to be split to be straight in a light's paraboloid map, edge by edge: neighbours that share
-// an edge split it alike.
+// Cuts a triangle at the plane of a light, behind which nothing shows, and says how finely what is left has to be split to
+// be nearly straight in the light's paraboloid map. The outline moves out by as much as it may still bend (paraboloid.tese),
+// so that the parts cover all of the triangle; paraboloid.frag discards what they cover beyond it.
 #include "lib/shadow.glsl"
 
-layout(vertices = 3) out;
+layout(vertices = 1) out;
 
 flat in int light_of_corner[];
 in vec3 corner[];
-flat out int light_of_patch[];
-out vec3 from_light[];
-patch out mat3 edges;  // planes through the light and an edge; a direction within the triangle is on their inner sides
-patch out vec4 plane;  // xyz: depth is its dot product with the direction in the light's frame; w: the least depth
+patch out int light_of_patch;
+patch out vec3 corners[4];  // unit, from the light to what is left of the triangle; the last two may be one
+patch out vec4 inwards[4];  // normals of the planes through the light and the edge to the next corner; angles of the edges
+patch out float turn;       // 1 if the corners go round their normals' way, else -1
+patch out float margin;     // how far to move the outline, an angle
+patch out mat3 edges;       // planes through the light and an edge; a direction within the triangle is on their inner sides
+patch out vec4 plane;       // xyz: depth is its dot product with the direction in the light's frame; w: the least depth
 
-const float HIGHEST = 64.0;
+const float HIGHEST = 64.0;   // OpenGL promises so many parts
 const float ROUNDING = 1e-3;  // of the near plane's distance: positions of the scene are no better known
-const float EDGE_ON = 1e-4;  // sine: no closer to the light's own plane can a surface be told from it
+const float WIDEST = 0.05;    // margin: so far behind the light's plane directions still have a place in the map
+const float EDGE_ON = 1e-4;   // sine: no closer to the light's own plane can a surface be told from it
 
-float map_size(Light light) {
-    return light.tile < 0.0 ? float(SPOT_SIZE) : float(VPL_SIZE);
+vec3 unit(vec3 v) {
+    return v * inversesqrt(max(dot(v, v), TINY));
 }
 
-// An edge of length l, at least D from the light, bends by no more than (l/D)^2 / 8 of the hemisphere's radius in the map.
-float level(Light light, vec3 a, vec3 b) {
-    float za = dot(a, light.z_axis), zb = dot(b, light.z_axis);
-    // What lies behind the light does not show.
-    vec3 start = za < 0.0 && zb > 0.0 ? mix(a, b, za / (za - zb)) : a;
-    vec3 end = zb < 0.0 && za > 0.0 ? mix(b, a, zb / (zb - za)) : b;
-    vec3 way = end - start, whole = b - a;
-    float nearest = clamp(-dot(start, way) / max(dot(way, way), TINY), 0.0, 1.0);
-    vec3 closest = start + way * nearest;
-    float bend = dot(whole, whole) / max(dot(closest, closest), TINY) * (map_size(light) / (16.0 * light.curve * light.tan_half));
-    return clamp(sqrt(bend / BEND), 1.0, HIGHEST);
+bool before(vec3 a, vec3 b) {
+    return a.x < b.x || a.x == b.x && (a.y < b.y || a.y == b.y && a.z < b.z);
+}
+
+// Normal of the plane through the light, a and b: that of b and a is its opposite to the last bit, so neighbours that share
+// an edge leave no gap.
+vec3 across(vec3 a, vec3 b) {
+    return before(b, a) ? -unit(cross(b, a)) : unit(cross(a, b));
+}
+
+// Where the way from a point in front of the light to one behind it meets the light's plane.
+vec3 cut(vec3 front, vec3 behind, float along_front, float along_behind) {
+    return mix(front, behind, along_front / (along_front - along_behind));
+}
+
+// An edge is a piece of a great circle as the light sees it, with the normal `inward.xyz` and the angle `inward.w`, and of a
+// circle in the map: over an angle t it bends by t^2 / 8 of that circle's radius, the hemisphere's over dot(normal, z_axis).
+// All as angles in the middle of the map, where a texel is largest.
+float bend(Light light, vec4 inward) {
+    return inward.w * inward.w * abs(dot(inward.xyz, light.z_axis)) / 4.0;
 }
 
 void main() {
-    from_light[gl_InvocationID] = corner[gl_InvocationID];
-    light_of_patch[gl_InvocationID] = light_of_corner[gl_InvocationID];
-    if (gl_InvocationID != 0) return;
     Light light = lights[light_of_corner[0]];
+    light_of_patch = light_of_corner[0];
     vec3 a = corner[0], b = corner[1], c = corner[2];
     vec3 sizes = vec3(length(a), length(b), length(c));
     vec3 along = vec3(dot(a, light.z_axis), dot(b, light.z_axis), dot(c, light.z_axis));
@@ -45,18 +57,42 @@ void main() {
     bool seen_edge_on = abs(h) <= ROUNDING * frame.near * length(normal);
     // Behind the light, or on its own surface, or without any area in the map.
     if (seen_edge_on || all(lessThanEqual(along, max(EDGE_ON * sizes, vec3(frame.near))))) {
-        gl_TessLevelOuter[0] = gl_TessLevelOuter[1] = gl_TessLevelOuter[2] = 0.0;
+        gl_TessLevelOuter[0] = gl_TessLevelOuter[1] = gl_TessLevelOuter[2] = gl_TessLevelOuter[3] = 0.0;
         return;
     }
-    gl_TessLevelOuter[0] = level(light, b, c);
-    gl_TessLevelOuter[1] = level(light, c, a);
-    gl_TessLevelOuter[2] = level(light, a, b);
-    // Inside there is no edge to keep, and depth goes by the plane; but the parts must not fold over each other much.
-    float most = max(max(gl_TessLevelOuter[0], gl_TessLevelOuter[1]), gl_TessLevelOuter[2]);
-    gl_TessLevelInner[0] = min(most, 4.0);
     mat3 to_frame = transpose(mat3(light.x_axis * light.tan_half, light.y_axis * light.tan_half, light.z_axis));
-    vec3 in_frame = to_frame * normal;
-    float side = h < 0.0 ? -1.0 : 1.0;
-    edges = to_frame * mat3(normalize(cross(a, b)) * side, normalize(cross(b, c)) * side, normalize(cross(c, a)) * side);
-    plane = vec4(in_frame * (frame.near / h), frame.near / max(max(sizes.x, max(sizes.y, sizes.z)), TINY));
+    turn = h < 0.0 ? -1.0 : 1.0;
+    edges = to_frame * mat3(across(a, b), across(b, c), across(c, a)) * turn;
+    plane = vec4(to_frame * normal * (frame.near / h), frame.near / max(max(sizes.x, max(sizes.y, sizes.z)), TINY));
+
+    // Turned so that the corners in front of the light come first: all, two or one.
+    for (int turned = 0; turned < 2; ++turned) {
+        if (along.x > 0.0 && (along.z <= 0.0 || along.y > 0.0)) break;
+        vec3 first = a;
+        a = b;
+        b = c;
+        c = first;
+        along = along.yzx;
+    }
+    vec3 d = c;
+    if (along.z <= 0.0) {
+        d = cut(a, c, along.x, along.z);
+        c = along.y > 0.0 ? cut(b, c, along.y, along.z) : d;
+        if (along.y <= 0.0) b = cut(a, b, along.x, along.y);
+    }
+    vec3 left[4] = vec3[4](unit(a), unit(b), unit(c), unit(d));
+    float texel = 4.0 * light.curve * light.tan_half / (light.tile < 0.0 ? float(SPOT_SIZE) : float(VPL_SIZE));
+    float tolerated = min(BEND * texel, WIDEST);
+    margin = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        vec3 start = left[i], end = left[(i + 1) % 4];
+        corners[i] = start;
+        vec4 inward = vec4(across(start, end) * turn, atan(length(cross(start, end)), dot(start, end)));
+        inwards[i] = inward;
+        float most = bend(light, inward), count = clamp(ceil(sqrt(most / tolerated)), 1.0, HIGHEST);
+        margin = max(margin, most / (count * count));
+        gl_TessLevelOuter[(i + 1) % 4] = count;
+    }
+    margin += 0.1 * texel;
+    gl_TessLevelInner[0] = gl_TessLevelInner[1] = 1.0;  // the parts cover what their outline encloses, however they fold
 }

@@ -22,6 +22,7 @@ void main() {
     corner = d;
 #else
     part.seen = d;
-    place(light, d);
+    part.light = light_index;
+    part.ndc = place(light, d);
 #endif
 }

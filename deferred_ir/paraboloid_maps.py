@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .frame import Frame
+from .gl.cluster_buffers import ClusterBuffers
 from .io import Io
 from .maps import MapParams
 from .typing import Bools
@@ -18,9 +18,12 @@ FILES = ("paraboloid.frag", "paraboloid.vert")
 SPLIT = ("paraboloid.tesc", "paraboloid.tese")
 
 
-def draw(frame: Frame, io: Io, params: MapParams, records: np.ndarray, chosen: Bools, *, layered: bool) -> None:
-    """Draw the lights `chosen`, bool (n,), of the bound block, whose records (n,) are given; layered: into an atlas."""
-    gpu, clusters = io.gpu, frame.buffers.cluster_buffers.clusters
+def draw(mesh: ClusterBuffers, io: Io, params: MapParams, records: np.ndarray, chosen: Bools, *, layered: bool) -> None:
+    """Draw `mesh` for the lights `chosen`, bool (n,), of the bound block, whose records (n,) are given.
+
+    layered: into an atlas.
+    """
+    gpu, clusters = io.gpu, mesh.clusters
     visible = clusters.visible(records, hemisphere=True) & chosen[:, None]
     bent = clusters.bent(records, params.reach(records))
     gpu.clip(5)  # behind the light, and the map's four sides
@@ -29,5 +32,5 @@ def draw(frame: Frame, io: Io, params: MapParams, records: np.ndarray, chosen: B
         if share.any():
             files = [*FILES, *(SPLIT if split else ()), *geometry]
             program = io.program(*files, defines={"SPLIT": int(split), "BEND": float(params.bend)})
-            frame.buffers.draw_clusters(program, share, patches=split)
+            mesh.draw(program, share, patches=split)
     gpu.clip(0)

@@ -163,7 +163,8 @@ class Renderer:
 
     def _forget(self) -> None:
         if self._buffers:
-            self.executor.library.forget(self._buffers)
+            for owner in self._buffers.owners:
+                self.executor.library.forget(owner)
             self._buffers.release()
         self._buffers = self._tracer = self._scene = None
 

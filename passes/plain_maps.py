@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir import paraboloid_maps
+from deferred_ir import map_meshes, paraboloid_maps
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.io import Io
@@ -42,7 +42,7 @@ class PlainMaps(Pass):
         return None if facts.emits else "no light needs one: the spotlight emits nothing"
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Draw the scene for each light."""
+        """Draw all triangles for each light."""
         self.params.prepare(io.gpu)
         program = io.program("depth.frag", "plain_maps.vert")
         total = len(io["lights"].records)
@@ -54,13 +54,15 @@ class PlainMaps(Pass):
             framebuffer = texture.framebuffer
             framebuffer.bind()
             framebuffer.clear_depth()
+            own = frame.buffers.cluster_buffers
+            mesh = map_meshes.of_vpls(frame, self.params) if i else own
             if curved[i]:
                 records = io["lights"].records[block * LIGHTS_PER_BLOCK :][:LIGHTS_PER_BLOCK]
                 only = np.arange(len(records)) == number
-                paraboloid_maps.draw(frame, io, self.params, records, only, layered=False)
+                paraboloid_maps.draw(mesh, io, self.params, records, only, layered=False)
             else:
                 program.set(light_number=number)
-                frame.buffers.draw(program)
+                (frame.buffers.draw if mesh is own else mesh.draw_all)(program)
         io.count("maps_drawn", total)
 
 

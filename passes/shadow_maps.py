@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from deferred_ir import paraboloid_maps
+from deferred_ir import map_meshes, paraboloid_maps
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.io import Io
@@ -66,16 +66,16 @@ class ShadowMaps(Pass):
         geometry = [] if gpu.layer_from_vertex else ["shadow_maps.geom"]
         program = io.program("depth.frag", "shadow_maps.vert", *geometry)
         total = len(lights.records)
-        clusters = frame.buffers.cluster_buffers.clusters
         for start in range(0, total, LIGHTS_PER_BLOCK):
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
             records = lights.records[start : start + LIGHTS_PER_BLOCK]
             curved = self.params.paraboloid(records)
-            if not curved.all():
-                gpu.clip(4)
-                frame.buffers.draw_clusters(program, clusters.visible(records) & ~curved[:, None])
-            if curved.any():
-                paraboloid_maps.draw(frame, io, self.params, records, curved, layered=True)
+            for mesh, drawn in map_meshes.shares(frame, self.params, records):
+                if (drawn & ~curved).any():
+                    gpu.clip(4)
+                    mesh.draw(program, mesh.clusters.visible(records) & (drawn & ~curved)[:, None])
+                if (drawn & curved).any():
+                    paraboloid_maps.draw(mesh, io, self.params, records, drawn & curved, layered=True)
         io.count("maps_drawn", total)
 
 

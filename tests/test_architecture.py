@@ -16,7 +16,7 @@ SHADERS = {".glsl", ".vert", ".frag", ".geom", ".comp"}
 LONGEST = 350
 OPEN_TO_PASSES = {
     *("graph", "params", "gl", "camera", "lights", "tracing", "timing", "sampling", "errors", "typing"),
-    *("frame", "io", "maps", "paraboloid_maps", "vpls"),
+    *("frame", "io", "maps", "map_meshes", "paraboloid_maps", "vpls"),
 }
 CLOSED_TO_PASSES = {"renderer", "executor", "config", "cli", "doctor", "viewer"}
 

@@ -7,8 +7,9 @@ import pytest
 from fixed_lights import lit_by, spot_record, vpl_records
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_scenes import Mesh, build, room
+from small_scenes import Mesh, build, crooked_room, room
 
+from deferred_ir import map_meshes
 from deferred_ir.clusters import Clusters
 from deferred_ir.gl import scene_buffers
 from deferred_ir.lights import LIGHT, LIGHTS_PER_BLOCK, light_records
@@ -219,3 +220,42 @@ def test_memory_counts_clusters_once_they_are_made(renderer):
     with_clusters = one._buffers.buffer_bytes
     assert with_clusters == sum(b.size for b in one._buffers._buffers) + one._buffers.cluster_buffers.nbytes
     assert one._buffers.cluster_buffers.nbytes >= 24 * 3 * 4
+
+
+# Stand-ins
+
+
+def halved(scene):
+    """Only every other triangle, with vertices of its own."""
+    geometry = scene.geometry
+    corners = geometry.positions[geometry.faces[::2]]
+    return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("graph", ["deferred", "forward"])
+@pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
+def test_maps_of_vpls_alone_draw_a_stand_in(renderer, monkeypatch, graph, projection):
+    """Without every other triangle shadows are missing; the spotlight's stay, so direct light is the same."""
+    scene, makes = crooked_room(), []
+
+    def other(frame, params):
+        def make():
+            makes.append(params)
+            return halved(scene)
+
+        return frame.buffers.stand_in("halved", make)
+
+    one = renderer((48, 48), graph, set={"shadow_maps.projection": projection})
+    whole, direct = (one.render(scene, vpls=vpls).radiance for vpls in (16, 0))
+    before = one._buffers.buffer_bytes
+    monkeypatch.setattr(map_meshes, "of_vpls", other)
+    half = [one.render(scene, vpls=16).radiance for _ in range(2)]
+    assert half[0].mean() > 1.002 * whole.mean()
+    np.testing.assert_array_equal(*half)
+    np.testing.assert_array_equal(one.render(scene, vpls=0).radiance, direct)
+    assert len(makes) == 1
+    mesh = one._buffers.stand_in("halved", lambda: halved(scene))
+    assert one._buffers.buffer_bytes == before + mesh.nbytes + 12 * 3 * 3 * 4
+    one._forget()
+    one.render(scene, vpls=16)
+    assert len(makes) == 2

@@ -109,7 +109,7 @@ def test_a_scene_that_is_gone_leaves_no_vertex_arrays(renderer):
     for scene in (room(), build(plane())):
         one.render(scene, vpls=4)
     drawn = {key for program in one.executor.library._programs.values() for key in program.arrays}
-    assert drawn == {None, one._buffers}
+    assert drawn == {None, one._buffers, one._buffers.cluster_buffers}
 
 
 def test_memory_is_given_back_with_the_plan(renderer):

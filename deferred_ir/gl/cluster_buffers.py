@@ -16,10 +16,13 @@ COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index
 
 
 class ClusterBuffers:
-    """Indices of `faces` (F, 3) in the order of `clusters`, and what a call draws of them."""
+    """Indices of `faces` (F, 3) in the order of `clusters`, and what a call draws of them.
 
-    def __init__(self, gpu: Gpu, clusters: Clusters, faces: Ints) -> None:
-        self.gpu, self.clusters = gpu, clusters
+    positions: the buffer of vertices, three floats each; it stays its maker's.
+    """
+
+    def __init__(self, gpu: Gpu, clusters: Clusters, faces: Ints, positions: Any) -> None:
+        self.gpu, self.clusters, self._positions = gpu, clusters, positions
         self._indices = gpu.ctx.buffer(np.ascontiguousarray(faces[clusters.order], "u4").tobytes())
         self._lights = gpu.ctx.buffer(reserve=4, dynamic=True)
         self._commands = gpu.ctx.buffer(reserve=len(clusters) * COMMAND.itemsize, dynamic=True)
@@ -32,14 +35,15 @@ class ClusterBuffers:
         """Size of all buffers."""
         return sum(buffer.size for buffer in (self._indices, self._lights, self._commands))
 
-    def array(self, program: Program, positions: tuple[Any, str]) -> Any:
-        """The vertex array of a program that reads `position` and `light_index`; positions: a buffer and its layout."""
-        # An instanced attribute counts from base_instance; gl_InstanceID does not.
-        attributes = [(*positions, "position"), (self._lights, "1i/i", "light_index")]
-        return self.gpu.ctx.vertex_array(program.glsl, attributes, self._indices, index_element_size=4)
+    def draw_all(self, program: Program) -> None:
+        """Draw all triangles once. The program reads `position` alone."""
+        self._array(program).render(self.gpu.ctx.TRIANGLES)
 
-    def draw(self, array: Any, visible: Bools, patches: bool = False) -> None:
-        """Draw cluster c with light_index l wherever visible[l, c], bool (lights, clusters)."""
+    def draw(self, program: Program, visible: Bools, patches: bool = False) -> None:
+        """Draw cluster c for light l wherever visible[l, c], bool (lights, clusters).
+
+        The program reads `position` and `light_index`, the row of `visible`.
+        """
         cluster, light = np.nonzero(visible.T)
         instances = np.bincount(cluster, minlength=len(self.clusters))
         commands = self._each.copy()
@@ -55,9 +59,20 @@ class ClusterBuffers:
         if patches:
             self.gpu.ctx.patch_vertices = 3
         mode = self.gpu.ctx.PATCHES if patches else self.gpu.ctx.TRIANGLES
-        array.render_indirect(self._commands, mode, count=len(commands))
+        self._array(program).render_indirect(self._commands, mode, count=len(commands))
+
+    def _array(self, program: Program) -> Any:
+        """What `program` reads of it."""
+        if self not in program.arrays:
+            # An instanced attribute counts from base_instance; gl_InstanceID does not.
+            known = [(self._positions, "3f", "position"), (self._lights, "1i/i", "light_index")]
+            attributes = [attribute for attribute in known if attribute[2] in program.attributes]
+            program.arrays[self] = self.gpu.ctx.vertex_array(
+                program.glsl, attributes, self._indices, index_element_size=4
+            )
+        return program.arrays[self]
 
     def release(self) -> None:
-        """Give the buffers back."""
+        """Give the buffers back. Vertex arrays that programs keep for it must go first."""
         for buffer in (self._indices, self._lights, self._commands):
             buffer.release()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable, Hashable
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from ..errors import DeviceError
 from ..graph import Texture
 from ..materials import srgb_table
 from ..scene import Scene
-from ..typing import Bools
+from ..typing import Array, Ints
 from .cluster_buffers import ClusterBuffers
 from .gpu import Gpu
 from .resources import GpuTexture
@@ -22,6 +22,8 @@ FACES, MATERIALS = 0, 1
 """Bindings of the storage buffers that lib/surface.glsl declares."""
 ALBEDO_TEXTURE = 15
 """Texture unit of `albedo_texture`; inputs of passes count up from 0, and GL promises 16 units."""
+OWN = "own"
+"""Key of the scene's own triangles in clusters, among those of stand-ins."""
 
 
 class SceneBuffers:
@@ -53,19 +55,40 @@ class SceneBuffers:
         self.face_count = len(g.faces)
         buffers = [*(buffer for buffer, _ in self._attributes.values()), self._indices, self._faces, self._materials]
         self._buffers = buffers
+        self._clustered: dict[Hashable, ClusterBuffers] = {}
         self.texture_bytes = sum(texture.nbytes for texture in self._textures)
 
     @property
     def buffer_bytes(self) -> int:
-        """Bytes of all buffers, those of the clusters too once there are some."""
-        clusters = self.cluster_buffers.nbytes if "cluster_buffers" in self.__dict__ else 0
-        return sum(buffer.size for buffer in self._buffers) + clusters
+        """Bytes of all buffers, those of clusters too once there are some."""
+        return sum(buffer.size for buffer in self._buffers) + sum(mesh.nbytes for mesh in self._clustered.values())
 
-    @cached_property
+    @property
+    def owners(self) -> list[Any]:
+        """Under what programs keep vertex arrays for this scene."""
+        return [self, *self._clustered.values()]
+
+    @property
     def cluster_buffers(self) -> ClusterBuffers:
-        """The triangles in clusters, made when first drawn so."""
-        g = self._scene.geometry
-        return ClusterBuffers(self.gpu, Clusters(g.positions, g.faces), g.faces)
+        """The scene's triangles in clusters, made when first drawn so."""
+        if OWN not in self._clustered:
+            g = self._scene.geometry
+            self._clustered[OWN] = self._cluster(g.positions, g.faces, self._attributes["position"][0])
+        return self._clustered[OWN]
+
+    def stand_in(self, key: Hashable, make: Callable[[], tuple[Array, Ints]]) -> ClusterBuffers:
+        """Another mesh that is drawn in the scene's place, in clusters, kept by `key` until the scene goes.
+
+        make: gives positions (V, 3) and faces (F, 3); called for the first draw only.
+        """
+        if key not in self._clustered:
+            positions, faces = make()
+            self._buffers.append(self.gpu.ctx.buffer(np.ascontiguousarray(positions, "f4").tobytes()))
+            self._clustered[key] = self._cluster(positions, faces, self._buffers[-1])
+        return self._clustered[key]
+
+    def _cluster(self, positions: Array, faces: Ints, uploaded: Any) -> ClusterBuffers:
+        return ClusterBuffers(self.gpu, Clusters(positions, faces), faces, uploaded)
 
     def _upload(self, texture: Any) -> GpuTexture:
         height, width = texture.pixels.shape[:2]
@@ -105,19 +128,10 @@ class SceneBuffers:
             program.set(textured=texture is not None, first_face=first)
             array.render(self.gpu.ctx.TRIANGLES, vertices=3 * count, first=3 * first, instances=instances)
 
-    def draw_clusters(self, program: Program, visible: Bools, patches: bool = False) -> None:
-        """Draw each cluster of `cluster_buffers` for the lights that may see it: bool (lights, clusters).
-
-        The program reads `position` and `light_index`, the row of `visible`.
-        """
-        if self not in program.arrays:
-            program.arrays[self] = self.cluster_buffers.array(program, self._attributes["position"])
-        self.cluster_buffers.draw(program.arrays[self], visible, patches)
-
     def release(self) -> None:
         """Give everything back. Vertex arrays that programs keep for this scene must go first."""
-        if "cluster_buffers" in self.__dict__:
-            self.cluster_buffers.release()
+        for mesh in self._clustered.values():
+            mesh.release()
         for buffer in self._buffers:
             buffer.release()
         for texture in self._textures:

@@ -9,20 +9,23 @@ from __future__ import annotations
 
 import numpy as np
 
+from .direct_light import lit_by
 from .lights import one_minus_cos
 from .scene import Scene
-from .tracing import Hits, Tracer
-from .typing import Array
+from .tracing import Tracer
 from .vpls import LUMINANCE, lift_to_hemisphere
 
 GRID = 128
 RAYS = 8
 
 
-def estimate(scene: Scene, tracer: Tracer, *, clamp: float, fov: float, seed: int = 0) -> dict[str, float] | None:
+def estimate(
+    scene: Scene, tracer: Tracer, *, clamp: float, fov: float, given_back: bool = False, seed: int = 0
+) -> dict[str, float] | None:
     """Relative indirect light lost to `clamp` (fraction of the diagonal) and to the cone `fov` (degrees), both <= 0.
 
-    Of the first bounce, over the image, by luminance. None where the camera sees no indirect light.
+    Of the first bounce, over the image, by luminance. given_back: what is lost within the clamp distance is added by
+    short rays (deferred_ir/near_field.py). None where the camera sees no indirect light.
     """
     rng = np.random.default_rng(seed)
     directions = scene.camera.rays((GRID, GRID)).reshape(-1, 3)
@@ -36,34 +39,23 @@ def estimate(scene: Scene, tracer: Tracer, *, clamp: float, fov: float, seed: in
     )
     points = np.stack([radius * np.cos(2 * np.pi * angle), radius * np.sin(2 * np.pi * angle)], axis=1)
     away = lift_to_hemisphere(points, seen.shading_normal[seen_at])
-    hits = tracer.closest(origins, away)
-    weight = (_reflected(scene, tracer, hits) * seen.albedo[seen_at]) @ LUMINANCE
-    weight[(away * seen.normal[seen_at]).sum(axis=1) <= 0] = 0  # into its own face: nothing arrives
+    above = np.flatnonzero((away * seen.normal[seen_at]).sum(axis=1) > 0)  # into its own face: nothing arrives
+    found, hits = tracer.within(origins[above], away[above], np.inf)
+    rays = above[found]
+    light = scene.spotlight
+    lit = np.multiply.outer(lit_by(light, tracer, hits, rng), np.asarray(light.emission, float))
+    weight = (lit * hits.albedo * seen.albedo[seen_at[rays]]) @ LUMINANCE
     total = weight.sum()
     if total <= 0:
         return None
-    distance = np.linalg.norm(hits.position - origins, axis=1)
+    distance = np.linalg.norm(hits.position - origins[rays], axis=1)
     c = clamp * scene.geometry.diagonal
     kept = np.minimum(1, (distance / c) ** 2) if c > 0 else np.ones(len(distance))
-    outside = -(away * hits.normal).sum(axis=1) < 1 - one_minus_cos(fov)
+    outside = -(away[rays] * hits.normal).sum(axis=1) < 1 - one_minus_cos(fov)
+    if given_back:
+        kept[:] = 1
+        outside &= distance > c
     return {
         "clamp": round(float((weight * (kept - 1)).sum() / total), 5),
         "wide_light": round(float(-weight[outside].sum() / total), 5),
     }
-
-
-def _reflected(scene: Scene, tracer: Tracer, hits: Hits) -> Array:
-    """Directly lit radiance of surfaces (n, 3); 0 where the ray met none."""
-    light = scene.spotlight
-    position = np.asarray(light.position, float)
-    to = position - hits.position
-    square = np.maximum((to**2).sum(axis=1), np.finfo(float).tiny)
-    towards = to / np.sqrt(square)[:, None]
-    facing = hits.hit & ((towards * hits.normal).sum(axis=1) > 0)
-    cosine = np.maximum((towards * hits.shading_normal).sum(axis=1), 0) * facing
-    strength = np.maximum(-towards @ light.axis, 0) * light.cone(-towards) * cosine / square
-    lit = np.flatnonzero(strength)
-    starts = tracer.lift(hits.position[lit], hits.normal[lit])
-    strength[lit[tracer.occluded(starts, np.broadcast_to(position, starts.shape))]] = 0
-    radiance: Array = hits.albedo * np.multiply.outer(strength / np.pi, np.asarray(light.emission, float))
-    return radiance

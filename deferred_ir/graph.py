@@ -85,12 +85,17 @@ class Facts:
     emits: bool = True
     """The spotlight has power."""
 
+    clamped: bool = True
+    """VPLs light what is near them with less than they should."""
+
 
 class Pass:
     """Base of all passes: ports and parameters as data, `execute` does the work each frame."""
 
     Params: ClassVar[type] = NoParams
     inputs: ClassVar[Mapping[str, Input]] = {}
+    gives_back: ClassVar[bool] = False
+    """It adds the light that VPLs' clamp takes (`bias` in RUN.json)."""
     shader_folder: ClassVar[Path | None] = None
     """Where a user's pass keeps its shaders; searched before the package's own."""
 
@@ -103,6 +108,10 @@ class Pass:
         Raises GraphError for what does not fit together; `compile` adds the pass's name.
         """
         raise NotImplementedError
+
+    def informed(self, facts: Facts) -> Facts:
+        """`facts` and what this pass's parameters add to them for the other passes."""
+        return facts
 
     def unneeded(self, facts: Facts) -> str | None:
         """Why this scene does not need the pass, or None."""
@@ -165,6 +174,8 @@ def compile(graph: Graph, outputs: Sequence[str], facts: Facts = Facts()) -> Pla
     """
     faults: list[str] = []
     roots, edges = _resolve(graph, outputs, faults)
+    for node in graph.nodes.values():
+        facts = node.work.informed(facts)
     unneeded = _leave_out(graph, edges, facts)
     for name, (source, _) in roots.items():
         if source in unneeded:

@@ -40,13 +40,13 @@ class Io:
         textures = [name for name in step.work.inputs if isinstance(ports[name], GpuTexture)]
         sampled = [name for name in textures if not step.work.inputs[name].attach]
         self._units = {name: i for i, name in enumerate(sampled)}
-        self._defines: dict[str, int | float] = {f"UNIT_{name.upper()}": i for name, i in self._units.items()}
+        self.defines: dict[str, int | float] = {f"UNIT_{name.upper()}": i for name, i in self._units.items()}
         for name, source in step.sources.items():
-            self._defines[f"HAS_{name.upper()}"] = int(source is not None)
+            self.defines[f"HAS_{name.upper()}"] = int(source is not None)
             if source:
-                self._defines |= written[source]
+                self.defines |= written[source]
         for output in step.outputs.values():
-            self._defines |= output.defines
+            self.defines |= output.defines
 
     def __getitem__(self, port: str) -> Any:
         if port not in self._ports:
@@ -77,7 +77,7 @@ class Io:
         key = (*files, *defines.items())
         if key not in self._programs:
             folder = self._step.work.shader_folder
-            program = self._library.program(*files, defines={**self._defines, **defines}, folder=folder)
+            program = self._library.program(*files, defines={**self.defines, **defines}, folder=folder)
             unknown = program.samplers - SCENE_SAMPLERS - set(self._step.work.inputs)
             if unknown:
                 raise ShaderError(f"{program.name}: sampler '{min(unknown)}' is no input of pass {self._step.name}")

@@ -46,18 +46,19 @@ def run_record(
         "passes": passes,
         "maps_drawn": [counters.get("maps_drawn", 0) for counters in record.counters],
         "left_out": [{"what": name, "why": why, "ms": None, "bytes": None} for name, why in plan.left_out.items()],
-        "bias": _bias(renderer, scene, graph),
+        "bias": _bias(renderer, scene, graph, plan),
         "memory_bytes": renderer.memory(),
     }
 
 
-def _bias(renderer: Renderer, scene: Scene, graph: Graph) -> dict[str, float] | None:
+def _bias(renderer: Renderer, scene: Scene, graph: Graph, plan: Plan) -> dict[str, float] | None:
     """Indirect light lost by design, None where no VPLs were asked for or the camera sees no indirect light."""
     casting = graph.nodes.get("vpl")
     if casting is None or casting.work.params.count == 0 or not scene.facts.emits:
         return None
     p = casting.work.params
-    return bias.estimate(scene, renderer.tracer(), clamp=p.clamp, fov=p.fov)
+    given_back = any(step.work.gives_back for step in plan.steps)
+    return bias.estimate(scene, renderer.tracer(), clamp=p.clamp, fov=p.fov, given_back=given_back)
 
 
 def write(path: Path, data: dict[str, Any]) -> None:

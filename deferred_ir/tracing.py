@@ -92,6 +92,22 @@ class Tracer:
         v = np.concatenate([part["v"] for part in parts] or [np.zeros(0)]).astype(np.float64)
         return self._hits(face, np.stack([1 - u - v, u, v], axis=-1), np.asarray(directions, np.float64))
 
+    def within(self, origins: Array, directions: Array, reach: float) -> tuple[Ints, Hits]:
+        """Which of the rays (n, 3), (n, 3) meet a surface within `reach` lengths of their directions, and where.
+
+        Rows of the rays (m,), ascending, and their m closest hits. As `closest`, but free of what rays that miss cost.
+        """
+        org, dirs = origins.astype(np.float32), directions.astype(np.float32)
+        tfar = np.full(len(org), min(reach, 1e37), np.float32)
+        parts = self._map(
+            lambda chunk: self._embree.run(org[chunk], dirs[chunk], dists=tfar[chunk].copy(), output=1), len(org)
+        )
+        face, u, v = (np.concatenate([part[name] for part in parts]) for name in ("primID", "u", "v"))
+        rows = np.flatnonzero(face >= 0)
+        u, v = u[rows].astype(np.float64), v[rows].astype(np.float64)
+        weights = np.stack([1 - u - v, u, v], axis=-1)
+        return rows, self._hits(face[rows], weights, np.asarray(directions[rows], np.float64))
+
     def _hits(self, face: Ints, weights: Array, directions: Array) -> Hits:
         geometry = self.scene.geometry
         hit = face >= 0

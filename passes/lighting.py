@@ -23,6 +23,7 @@ class Lighting(Pass):
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
         "albedo": Input("reflectance", format="rgba16f"),
+        "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
         "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
         "blockers": Input("the same maps: what hides a part of the spotlight's disc", format="depth32f", optional=True),
     }

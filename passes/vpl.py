@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from deferred_ir.frame import Frame
-from deferred_ir.graph import Buffer, Description, Output, Pass
+from deferred_ir.graph import Buffer, Description, Facts, Output, Pass
 from deferred_ir.io import Io
 from deferred_ir.lights import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
 from deferred_ir.params import param
@@ -43,7 +43,12 @@ class Vpl(Pass):
         """One buffer with room for the spotlight and a VPL for each ray of each bounce."""
         del inputs
         records = Buffer("light", 1 + self.params.count * self.params.bounces, LIGHT.itemsize, LIGHTS_PER_BLOCK)
-        return {"lights": Output("the spotlight, then the VPLs", records, {"LIGHTS_PER_BLOCK": LIGHTS_PER_BLOCK})}
+        defines = {"LIGHTS_PER_BLOCK": LIGHTS_PER_BLOCK, "BOUNCES": self.params.bounces}
+        return {"lights": Output("the spotlight, then the VPLs", records, defines)}
+
+    def informed(self, facts: Facts) -> Facts:
+        """Whether there is a clamp, and anything to clamp."""
+        return replace(facts, clamped=self.params.clamp > 0 and self.params.count > 0)
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Cast, pack, upload."""

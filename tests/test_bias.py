@@ -50,6 +50,15 @@ def test_the_clamp_takes_more_the_larger_it_is():
     assert losses[-1] > -1
 
 
+def test_what_short_rays_give_back_is_not_lost():
+    scene = room()
+    limits = {"clamp": 0.1, "fov": 120}
+    plain, mended = (bias.estimate(scene, Tracer(scene), given_back=back, **limits) for back in (False, True))
+    assert mended["clamp"] == 0 > plain["clamp"]
+    assert plain["wide_light"] < mended["wide_light"] < 0  # beyond the rays' reach the cone's loss stays
+    assert bias.estimate(scene, Tracer(scene), given_back=True, clamp=10, fov=120) == {"clamp": 0, "wide_light": 0}
+
+
 def test_without_indirect_light_there_is_nothing_to_lose():
     scene = build(plane())
     assert bias.estimate(scene, Tracer(scene), clamp=0.02, fov=150) is None

@@ -1,0 +1,83 @@
+"""Give back by short rays what the clamp takes (Kollig and Keller 2004): lights, G-buffer -> residual.
+
+The G-buffer is read back, Embree traces on the CPU, and the residual goes up as a texture, to be filtered with the
+light of the VPLs that it completes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import sqrt
+from typing import ClassVar
+
+from deferred_ir.frame import Frame
+from deferred_ir.graph import Description, Facts, Input, Output, Pass, Texture
+from deferred_ir.io import Io
+from deferred_ir.near_field import VplLimits, residual
+from deferred_ir.params import param
+from deferred_ir.surfaces import from_gbuffer
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of the near field."""
+
+    samples: float = param(
+        4.0, lo=0.25, hi=16.0, doc="Rays a pixel; below 1 the share of pixels that trace one, above 1 a whole number."
+    )
+
+
+class NearField(Pass):
+    """Irradiance that clamped VPLs miss, unfiltered."""
+
+    Params = Params
+    gives_back = True
+    inputs: ClassVar[Mapping[str, Input]] = {
+        "lights": Input("the spotlight, then the VPLs: their clamp and cone", format="light"),
+        "vpls": Input("the VPLs as dealt to pixels, whose blocks the rays' pattern shares", "share", optional=True),
+        "depth": Input("reversed depth", format="depth32f"),
+        "normals": Input("shading and geometric normal", format="rgba16"),
+    }
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """One texture of the frame's size."""
+        del inputs
+        doc = "irradiance lost to the clamp; alpha: the pixel's weight, 0 where no ray was traced"
+        return {"residual": Output(doc, Texture("rgba32f"))}
+
+    def unneeded(self, facts: Facts) -> str | None:
+        """Without a clamp there is no residual, and without light none either."""
+        if not facts.emits:
+            return "the spotlight emits nothing"
+        return None if facts.clamped else "nothing is clamped: vpl.clamp or vpl.count is 0"
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Read back, trace, upload."""
+        vpl = io["lights"].records[1:2]
+        if len(vpl) == 0:
+            io.framebuffer.clear_color()
+            return
+        scene = frame.scene
+        seen = from_gbuffer(
+            scene.camera,
+            frame.near,
+            io["depth"].read()[..., 0],
+            io["normals"].read(),
+            smooth=scene.geometry.normals is not None,
+        )
+        image = residual(
+            frame.tracer(),
+            scene.spotlight,
+            seen,
+            frame.size,
+            VplLimits(clamp=sqrt(vpl["clamp_squared"][0]), cosine=1 - float(vpl["one_minus_cos"][0])),
+            samples=self.params.samples,
+            block=int(io.defines.get("INTERLEAVE", 1)),
+            bounces=int(io.defines["BOUNCES"]),
+            seed=frame.seed,
+        )
+        io["residual"].upload(image)
+
+
+PASS = NearField

@@ -16,6 +16,9 @@ WIDEST_PLANAR = 140.0
 """A spotlight wider than this, in degrees, gets a paraboloid map: the planar one has few texels for its middle."""
 WIDE = one_minus_cos(WIDEST_PLANAR)
 
+LEAST_REACH = 2.0
+"""In paraboloid maps triangles nearer than this, in lengths of their edges, are split, however small the map is."""
+
 
 @dataclass(frozen=True)
 class MapParams:
@@ -42,7 +45,7 @@ class MapParams:
         "perspective", doc="Of the VPLs' maps. The spotlight's is a paraboloid where it is wider than 140 degrees."
     )
     bend: float = param(
-        1.0, lo=0.1, hi=64.0, doc="Paraboloid maps: edges that may be off by more texels than this are split."
+        4.0, lo=0.1, hi=16.0, doc="Paraboloid maps: edges that may be off by more texels than this are split."
     )
     cull: Literal["none", "front"] = param(
         "none", doc="front: draw back faces only, which moves the bias to the dark side; for closed meshes."
@@ -91,11 +94,13 @@ class MapParams:
     def reach(self, records: np.ndarray) -> Array:
         """How many of its lengths an edge must be away from a light to bend by less than `bend` texels, (n,).
 
-        An edge that subtends an angle a from the light bends by a^2 / 8 of the hemisphere's radius at most.
+        An edge that subtends an angle a from the light bends by a^2 / 8 of the hemisphere's radius at most. In small
+        maps that is little, but a triangle has to be smaller than the hemisphere, too, to be drawn as it is.
         """
         size = np.where(records["tile"] < 0, self.spot_size, self.vpl_size)
-        reach: Array = np.sqrt(size / (16 * records["curve"] * records["tan_half"] * self.bend))
-        return reach
+        reach = np.sqrt(size / (16 * records["curve"] * records["tan_half"] * self.bend))
+        least: Array = np.maximum(reach, LEAST_REACH)
+        return least
 
     def prepare(self, gpu: Any) -> None:
         """OpenGL state for drawing maps in reversed depth."""

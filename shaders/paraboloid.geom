@@ -22,9 +22,9 @@ void main() {
         gl_Position = gl_in[i].gl_Position;
         for (int side = 0; side < 5; ++side)
             gl_ClipDistance[side] = gl_in[i].gl_ClipDistance[side];
+#if SPLIT
         part.ndc = corner[i].ndc;
         part.light = corner[i].light;
-#if SPLIT
         part.edges = corner[i].edges;
         part.plane = corner[i].plane;
 #else

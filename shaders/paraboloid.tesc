@@ -81,8 +81,7 @@ void main() {
         if (along.y <= 0.0) b = cut(a, b, along.x, along.y);
     }
     vec3 left[4] = vec3[4](unit(a), unit(b), unit(c), unit(d));
-    float texel = 4.0 * light.curve * light.tan_half / (light.tile < 0.0 ? float(SPOT_SIZE) : float(VPL_SIZE));
-    float tolerated = min(BEND * texel, WIDEST);
+    float texel = texel_angle(light), tolerated = min(BEND * texel, WIDEST);
     margin = 0.0;
     for (int i = 0; i < 4; ++i) {
         vec3 start = left[i], end = left[(i + 1) % 4];

@@ -22,7 +22,6 @@ void main() {
     corner = d;
 #else
     part.seen = d;
-    part.light = light_index;
-    part.ndc = place(light, d);
+    place(light, d);
 #endif
 }

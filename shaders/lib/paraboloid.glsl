@@ -6,7 +6,8 @@
 #include "lib/atlas.glsl"
 #endif
 
-const float RIM = -0.3;  // cosine: triangles that reach into the map are cut off this far behind the hemisphere's rim
+// Cosine: parts of triangles are cut off this far behind the hemisphere's rim; fragments are cut at the near plane.
+const float RIM = -0.3;
 
 #if LAYER_FROM_VERTEX
 out float gl_ClipDistance[5];
@@ -26,7 +27,11 @@ vec2 place(Light light, vec3 d) {
     float divisor = light.curve * max(size + along, 0.25 * size + TINY);
     vec2 map_ndc = vec2(dot(d, light.x_axis), dot(d, light.y_axis)) / divisor;
     gl_Position = vec4(map_ndc, 0.5, 1.0);
+#if SPLIT
     gl_ClipDistance[0] = along - RIM * size;
+#else
+    gl_ClipDistance[0] = along - frame.near;
+#endif
     // The four sides of the map.
     gl_ClipDistance[1] = 1.0 + map_ndc.x;
     gl_ClipDistance[2] = 1.0 - map_ndc.x;

@@ -4,5 +4,5 @@
 // on their inner sides. plane: the depth is its xyz times the direction, its w the least that the triangle has.
 #define PART { vec2 ndc; flat int light; flat mat3 edges; flat vec4 plane; }
 #else
-#define PART { vec2 ndc; flat int light; vec3 seen; }  // seen: from the light, between the corners
+#define PART { vec3 seen; }  // from the light, between the corners
 #endif

@@ -20,6 +20,11 @@ float paraboloid_divisor(Light light, vec3 d) {
     return light.curve * (length(d) + dot(d, light.z_axis));
 }
 
+// A texel of the light's paraboloid map as an angle, where it is largest, in the middle of the map.
+float texel_angle(Light light) {
+    return 4.0 * light.curve * light.tan_half / (light.tile < 0.0 ? float(SPOT_SIZE) : float(VPL_SIZE));
+}
+
 // Clip position in the light's planar map.
 vec4 planar_clip(Light light, vec3 position) {
     vec3 d = position - light.position;

@@ -1,4 +1,4 @@
-"""Sample patterns in the unit square, and the map from there to a disc.
+"""Sample patterns in the unit square, the map from there to a disc, and systematic resampling.
 
 Sources: Shirley and Chiu 1997 (concentric map); Owen 1998, Joe and Kuo 2008 through scipy.stats.qmc (scrambled Sobol
 and Halton).
@@ -12,7 +12,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from .typing import Array
+from .typing import Array, Ints
 
 log = logging.getLogger("deferred_ir")
 Pattern = Literal["random", "stratified", "halton", "sobol"]
@@ -83,3 +83,14 @@ def disc(square: Array) -> Array:
     ratio = np.where(wide, b, a) / np.where(radius == 0, 1, radius)
     angle = np.where(wide, np.pi / 4 * ratio, np.pi / 2 - np.pi / 4 * ratio)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+
+def systematic(weights: Array, count: int, offset: float) -> Ints:
+    """`count` indices, each drawn count * weight / sum(weights) times, rounded up or down (systematic resampling).
+
+    Indices come in order. `offset`, uniform in [0, 1), makes it unbiased. Some weight must be above 0.
+    """
+    ends = np.cumsum(weights)
+    ticks = (np.arange(count) + offset) / count * ends[-1]
+    drawn: Ints = np.minimum(np.searchsorted(ends, ticks, side="right"), len(weights) - 1)
+    return drawn

@@ -27,8 +27,8 @@ TINY = np.float32(1e-37)
 
 
 @dataclass(frozen=True, eq=False)
-class _Lights:
-    """VPLs as the inner loop wants them: float32 (n, 3) each, `position` as in `_Patch`."""
+class Lights:
+    """VPLs as the inner loop wants them: float32 (n, 3) each, `position` as in `Patch`."""
 
     position: Array
     normal: Array
@@ -37,8 +37,20 @@ class _Lights:
     edge: np.float32  # squared cosine of the half cone angle
     clamp: np.float32  # c^2, c in diagonals
 
+    @classmethod
+    def of(cls, tracer: Tracer, vpls: Vpls, *, fov: float, clamp: float) -> Lights:
+        """From VPLs; fov and clamp as in `indirect`."""
+        return cls(
+            _centred(tracer, vpls.position).astype(np.float32),
+            vpls.normal.astype(np.float32),
+            tracer.lift(vpls.position, vpls.normal).astype(np.float32),
+            vpls.emission,
+            np.float32((1 - one_minus_cos(fov)) ** 2) if fov < 180 else np.float32(0),
+            np.float32(clamp**2),
+        )
 
-class _Patch:
+
+class Patch:
     """Some pixels' surfaces, coordinate by coordinate. Positions are centred and in diagonals of the scene.
 
     There single precision is finest, and fourth powers of distances fit in it, whatever the scene's unit.
@@ -51,11 +63,25 @@ class _Patch:
         self.shading_normal = np.ascontiguousarray(seen.shading_normal.T, np.float32)
         self.lifted = tracer.lift(seen.position, seen.normal).astype(np.float32)
 
-    def irradiance(self, lights: _Lights, chosen: slice) -> Array:
+    def kernels(self, lights: Lights) -> Array:
+        """cos cos V / max(d^2, c^2) for all n pixels and all m VPLs, times the squared diagonal, float32 (n, m)."""
+        position, normal = (np.ascontiguousarray(part.T)[:, None] for part in (lights.position, lights.normal))
+        way = self.position[..., None] - position
+        normals = self.normal[..., None], self.shading_normal[..., None]
+        result = _kernel(way, normal, *normals, edge=lights.edge, clamp=lights.clamp)
+        pixel, vpl = np.nonzero(result)
+        hidden = self.tracer.occluded(self.lifted[pixel], lights.lifted[vpl])
+        result[pixel[hidden], vpl[hidden]] = 0
+        return result
+
+    def irradiance(self, lights: Lights, chosen: slice) -> Array:
         """Irradiance by the VPLs `chosen`, times the squared diagonal, float64 (3, n)."""
         total = np.zeros(self.position.shape)
         for i in range(chosen.start, chosen.stop):
-            kernel = self._kernel(lights, i)
+            way = self.position - lights.position[i][:, None]
+            kernel = _kernel(
+                way, lights.normal[i], self.normal, self.shading_normal, edge=lights.edge, clamp=lights.clamp
+            )
             lit = np.flatnonzero(kernel)
             if len(lit) == 0:
                 continue
@@ -65,16 +91,21 @@ class _Patch:
                 total[channel] += kernel * lights.emission[i, channel]
         return total
 
-    def _kernel(self, lights: _Lights, i: int) -> Array:
-        """cos cos / max(d^2, c^2) for VPL i and all pixels, float32 (n,), as in shaders/lib/light.glsl."""
-        way = self.position - lights.position[i][:, None]
-        square = _dot(way, way)
-        leaving = np.maximum(_dot(lights.normal[i], way), 0)
-        arriving = np.maximum(-_dot(self.shading_normal, way), 0)
-        kernel = leaving * arriving / np.maximum(square * np.maximum(square, lights.clamp), TINY)
-        dark = (leaving * leaving < lights.edge * square) | (_dot(self.normal, way) >= 0)
-        kernel[dark] = 0
-        return kernel
+
+def _kernel(
+    way: Array, vpl_normal: Array, normal: Array, shading_normal: Array, *, edge: np.float32, clamp: np.float32
+) -> Array:
+    """cos cos / max(d^2, c^2) without visibility, float32 (...), as in shaders/lib/light.glsl.
+
+    way: from VPLs to surfaces, in diagonals of the scene. Coordinates are the first axis of `way` and of the normals,
+    the rest is broadcast. edge: squared cosine of the half cone angle. clamp: c^2.
+    """
+    square = _dot(way, way)
+    leaving = np.maximum(_dot(vpl_normal, way), 0)
+    arriving = np.maximum(-_dot(shading_normal, way), 0)
+    result: Array = leaving * arriving / np.maximum(square * np.maximum(square, clamp), TINY)
+    result[(leaving * leaving < edge * square) | (_dot(normal, way) >= 0)] = 0
+    return result
 
 
 def _centred(tracer: Tracer, positions: Array) -> Array:
@@ -107,17 +138,10 @@ def indirect(
     diagonals of the scene. The same for any number of threads.
     """
     pixels = np.flatnonzero(seen.hit)
-    lights = _Lights(
-        _centred(tracer, vpls.position).astype(np.float32),
-        vpls.normal.astype(np.float32),
-        tracer.lift(vpls.position, vpls.normal).astype(np.float32),
-        vpls.emission,
-        np.float32((1 - one_minus_cos(fov)) ** 2) if fov < 180 else np.float32(0),
-        np.float32(clamp**2),
-    )
+    lights = Lights.of(tracer, vpls, fov=fov, clamp=clamp)
     patches = [pixels[start : start + PIXELS] for start in range(0, len(pixels), PIXELS)]
     blocks = [slice(start, min(start + VPLS, len(vpls))) for start in range(0, len(vpls), VPLS)]
-    made = [_Patch(tracer, seen.rows(rows)) for rows in patches]
+    made = [Patch(tracer, seen.rows(rows)) for rows in patches]
     tasks = [(patch, block) for patch in range(len(patches)) for block in blocks]
     total = np.zeros((len(seen.face), 3))
     with closing(in_order(lambda task: made[task[0]].irradiance(lights, task[1]), tasks, threads)) as results:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from .lights import Spotlight, frames
-from .sampling import Pattern, disc, unit_disc, unit_square
+from .sampling import Pattern, disc, systematic, unit_disc, unit_square
 from .tracing import Tracer
 from .typing import Array, Ints
 
@@ -67,7 +67,7 @@ def cast(
         if rays == 0:
             break
         rng = np.random.default_rng([seed, bounce])
-        drawn = _resample(power, rays, rng.random())
+        drawn = systematic(power, rays, rng.random())
         # Each bounce has a pattern of its own, shuffled: in its own order it would go with that of the bounce before.
         square = rng.permutation(unit_square(pattern, rays, seed + bounce * 7919))
         normal = last.normal[drawn]
@@ -110,11 +110,3 @@ def _land(tracer: Tracer, origins: Array, directions: Array, carried: Array) -> 
     emission = carried * hits.albedo * ratio[:, None]
     alive = np.flatnonzero(hits.hit & (emission > 0).any(axis=1))
     return Vpls(hits.position[alive], hits.normal[alive], emission[alive], alive)
-
-
-def _resample(power: Array, count: int, offset: float) -> Ints:
-    """`count` indices, each drawn count * power / sum(power) times, rounded up or down (systematic resampling)."""
-    ends = np.cumsum(power)
-    ticks = (np.arange(count) + offset) / count * ends[-1]
-    drawn: Ints = np.minimum(np.searchsorted(ends, ticks, side="right"), len(power) - 1)
-    return drawn

@@ -13,8 +13,9 @@ from deferred_ir.graph import Buffer, Description, Facts, Output, Pass
 from deferred_ir.io import Io
 from deferred_ir.lights import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
 from deferred_ir.params import param
+from deferred_ir.resampling import effects, probes, resample
 from deferred_ir.sampling import Pattern, warn_unbalanced
-from deferred_ir.vpls import NONE, cast
+from deferred_ir.vpls import NONE, Vpls, cast
 
 
 @dataclass(frozen=True)
@@ -28,10 +29,13 @@ class Params:
     clamp: float = param(
         0.02, lo=0.0, hi=10.0, doc="Distance below which 1/d^2 is held, as a fraction of the scene's diagonal."
     )
+    candidates: int = param(
+        1, lo=1, hi=64, doc="Rays for each VPL that is kept, chosen by what it adds to the image. 1: all are kept."
+    )
 
 
 class Vpl(Pass):
-    """Traces `count` rays from the spotlight and packs what they make for the shaders."""
+    """Traces `count` rays from the spotlight, or more and chooses, and packs what they make for the shaders."""
 
     Params = Params
 
@@ -53,8 +57,7 @@ class Vpl(Pass):
     def execute(self, frame: Frame, io: Io) -> None:
         """Cast, pack, upload."""
         light, p = frame.scene.spotlight, self.params
-        shines = p.count > 0 and any(light.emission)
-        vpls = cast(light, frame.tracer(), p.count, p.pattern, frame.seed, bounces=p.bounces) if shines else NONE
+        vpls = self._cast(frame) if p.count > 0 and any(light.emission) else NONE
         records = np.zeros(1 + len(vpls), LIGHT)
         spot = np.array([light.position]), light.axis[None], np.array([light.emission])
         fill_records(records[:1], *spot, fov=light.fov, tile=SPOT_TILE)
@@ -65,6 +68,16 @@ class Vpl(Pass):
         records["clamp_squared"][1:] = (p.clamp * frame.scene.geometry.diagonal) ** 2
         io["lights"].write(records)
         io.count("vpls_alive", len(vpls))
+
+    def _cast(self, frame: Frame) -> Vpls:
+        """The VPLs of a frame; with candidates, `count` of them, or more where further bounces bring more."""
+        p, tracer, seed = self.params, frame.tracer(), frame.seed
+        vpls = cast(frame.scene.spotlight, tracer, p.count * p.candidates, p.pattern, seed, bounces=p.bounces)
+        count = max(p.count, -(-len(vpls) // p.candidates))
+        if len(vpls) <= count:
+            return vpls
+        seen = probes(tracer, frame.scene.camera, frame.size, seed)
+        return resample(vpls, effects(tracer, seen, vpls, fov=p.fov, clamp=p.clamp), count, seed)
 
 
 PASS = Vpl

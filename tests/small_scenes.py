@@ -87,6 +87,19 @@ def room(albedo: tuple[float, float, float] = GREY) -> Scene:
     )
 
 
+def two_rooms() -> Scene:
+    """Two rooms and a door between them: the light is in one, and the camera sees only what comes through to the other.
+
+    The door is a tenth of the wall and reaches to the ceiling.
+    """
+    return build(
+        box((-2, -1, -1), (2, 1, 1), (0.7, 0.7, 0.7)),
+        box((-0.05, -1, -1), (0.05, 1, 0.8), (0.6, 0.4, 0.3)),
+        camera=Camera((0.4, 0.0, -0.9), (1.9, -0.2, 0.5), fov=70.0),
+        spotlight=Spotlight((-0.4, 0.8, -0.5), (-0.4, -1.0, 0.6), 110.0, (3.0, 2.5, 2.0)),
+    )
+
+
 def crooked_room() -> Scene:
     """`room` with its corners out of place: no wall is parallel to another, so depths never tie along a whole wall."""
     scene = room()

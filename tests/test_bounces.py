@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from small_scenes import box, build, room, sphere
 
 from deferred_ir.lights import Spotlight
+from deferred_ir.sampling import systematic
 from deferred_ir.tracing import Tracer
-from deferred_ir.vpls import LUMINANCE, _resample, cast
+from deferred_ir.vpls import LUMINANCE, cast
 
 LIGHT = Spotlight((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), 120.0, (3.0, 2.0, 1.0))
 
@@ -89,7 +90,7 @@ def test_white_walls_and_fifty_bounces_stay_finite():
 @given(st.lists(st.floats(0, 1e6), min_size=1, max_size=50), st.integers(1, 80), st.floats(0, 1, exclude_max=True))
 def test_systematic_resampling_draws_each_in_proportion(powers, count, offset):
     power = np.array(powers) + 1e-6
-    drawn = np.bincount(_resample(power, count, offset), minlength=len(power))
+    drawn = np.bincount(systematic(power, count, offset), minlength=len(power))
     assert drawn.sum() == count
     assert np.all(np.abs(drawn - count * power / power.sum()) < 1 + 1e-6)
 

@@ -13,7 +13,7 @@ from small_scenes import box, build, plane, room, scaled, sphere, textured
 from deferred_ir import vpls
 from deferred_ir.lights import Spotlight
 from deferred_ir.materials import linear_from_srgb
-from deferred_ir.sampling import PATTERNS, disc
+from deferred_ir.sampling import PATTERNS, disc, systematic
 from deferred_ir.tracing import Tracer
 from deferred_ir.vpls import cast
 
@@ -254,6 +254,6 @@ def test_a_round_lights_rays_start_on_its_disc():
 
 @pytest.mark.parametrize("share", [(1.0, 1.0, 1.0), (3.0, 0.0, 1.0), (1e-30, 1e30, 1e30), (0.0, 0.0, 5.0)])
 def test_lights_go_on_in_proportion_to_their_power(share):
-    drawn = np.bincount(vpls._resample(np.array(share), 1000, 0.37), minlength=3)
+    drawn = np.bincount(systematic(np.array(share), 1000, 0.37), minlength=3)
     np.testing.assert_allclose(drawn, 1000 * np.array(share) / sum(share), atol=1)
     assert (drawn[np.array(share) == 0] == 0).all()

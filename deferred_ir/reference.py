@@ -185,7 +185,7 @@ def _by_vpls(
     shines = bounces > 0 and any(scene.spotlight.emission)
     lights = cast(scene.spotlight, tracer, params.count, params.pattern, seed, bounces=bounces) if shines else NONE
     indirect = vpl_reference.indirect(
-        tracer, seen, lights, fov=params.fov, clamp=params.clamp, threads=threads, progress=progress
+        tracer, seen, lights, fov=params.fov, clamp=params.clamp_fraction, threads=threads, progress=progress
     ).reshape(direct.shape)
     return Reference(
         (direct + indirect).astype(np.float32),

@@ -353,3 +353,13 @@ def test_the_graph_accurate_is_one_bounce_of_light(renderer):
     truth = PathTracer(scene, one.tracer()).estimate(SIZE, 256, seed=3)
     indirect = (image - truth.direct)[truth.hit].mean() / truth.indirect[truth.hit].mean()
     assert indirect == pytest.approx(1, abs=0.01)
+
+
+def test_the_graph_accurate_clamps_the_more_the_fewer_vpls_there_are(renderer):
+    scene, distances = room(), []
+    one = renderer(SIZE, "accurate")
+    for vpls in (16, 64):
+        one.draw(scene, one.plan(scene, vpls))
+        records = one.executor.resource(("vpl", "lights")).records
+        distances.append(records["clamp_squared"][1] ** 0.5 / scene.geometry.diagonal)
+    np.testing.assert_allclose(distances, [0.16, 0.08], rtol=1e-5)

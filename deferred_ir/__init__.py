@@ -15,6 +15,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .accumulation import Accumulation
     from .errors import DeviceError, Error, GraphError, OutputError, SceneError, SettingError, ShaderError
     from .image import Image
     from .loading import builtin_scenes, load
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 _WHERE = {
+    "Accumulation": "accumulation",
     "DeviceError": "errors",
     "Error": "errors",
     "GraphError": "errors",
@@ -37,6 +39,7 @@ _WHERE = {
 }
 
 __all__ = [
+    "Accumulation",
     "DeviceError",
     "Error",
     "GraphError",

@@ -74,6 +74,13 @@ def _parser() -> Parser:
         metavar="N",
         help="frame i shows time i/30 s",
     )
+    render.add_argument(
+        "--accumulate",
+        type=_positive,
+        default=1,
+        metavar="K",
+        help="average K frames of fresh samples in each image; Ctrl-C keeps what is done",
+    )
     render.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
     render.add_argument("--json", metavar="RUN.json", help="write what was rendered, and how long it took")
 

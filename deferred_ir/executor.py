@@ -7,6 +7,7 @@ and defines.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Container
 from typing import Any
 
 from .errors import DeviceError
@@ -35,8 +36,10 @@ class Executor:
         self._size = (0, 0)
         self._ios: list[Io] = []
 
-    def run(self, plan: Plan, frame: Frame, timers: Timers | None = None) -> None:
-        """Draw one frame; timers get a lap for each pass."""
+    def run(
+        self, plan: Plan, frame: Frame, timers: Timers | None = None, *, steps: Container[str] | None = None
+    ) -> None:
+        """Draw one frame, or of its passes only those named in `steps`; timers get a lap for each."""
         if plan is not self._plan or frame.size != self._size:
             self._allocate(plan, frame.size)
         self.counters.clear()
@@ -44,6 +47,8 @@ class Executor:
         self._frame_block.bind_to_uniform_block(FRAME_BLOCK)
         frame.buffers.bind()
         for step, io in zip(plan.steps, self._ios, strict=True):
+            if steps is not None and step.name not in steps:
+                continue
             self.gpu.reset()
             io.bind()
             if timers:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from .accumulation import Accumulation
 from .errors import OutputError
-from .image import check_folder, check_path
+from .graph import Plan
+from .image import Image, check_folder, check_path
 from .loading import load
 from .motion import FRAMES_PER_SECOND
 from .options import chosen_settings, chosen_size, notes
@@ -44,28 +48,80 @@ def render(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
     ) as renderer:
         print(f"OpenGL on {renderer.gpu.device}", file=sys.stderr)
         graph = renderer.graph()
-        plan = renderer.plan(scene, outputs=_wanted(outputs, graph.outputs))
+        plan = renderer.plan(scene, outputs=_wanted(outputs, graph.outputs, averaged=arguments.accumulate > 1))
         record = Record() if json else None
         if record:
             renderer.draw(scene, plan, seed=seed)  # compiles, allocates: not what a frame costs
         black = bool(outputs)
-        for i in _progress(arguments.frames):
-            renderer.draw(scene, plan, seed=seed, time=i / FRAMES_PER_SECOND, record=record)
-            last = i == arguments.frames - 1
+        for picture in _pictures(renderer, scene, plan, arguments, seed=seed, record=record):
+            last = picture.interrupted or picture.number == arguments.frames - 1
             due = [name for name in outputs if last or _NUMBER.search(name)]
             if due:
-                image = renderer.read(plan)
+                image = picture.image or renderer.read(plan)
                 black = black and not any(part.any() for part in (image.radiance, image.display) if part is not None)
                 for name in due:
-                    image.save(_numbered(name, i))
+                    image.save(_numbered(name, picture.number))
         if json and record:
             renderer.finish(record)
-            write(json, run_record(renderer, scene, str(graph_name), graph, plan, seed=seed, record=record))
+            made = run_record(
+                renderer, scene, str(graph_name), graph, plan, seed=seed, record=record, accumulated=picture.averaged
+            )
+            write(json, made)
     if black:
         print("note: the picture is black: the camera sees nothing that is lit", file=sys.stderr)
     if outputs:
-        print(f"wrote {', '.join(_told(name, arguments.frames) for name in outputs)}", file=sys.stderr)
+        print(f"wrote {', '.join(_told(name, picture.number + 1) for name in outputs)}", file=sys.stderr)
+    if picture.interrupted:
+        print(
+            f"deferred-ir: interrupted: averaged {picture.averaged} of {arguments.accumulate} frames", file=sys.stderr
+        )
+        return 130
     return 0
+
+
+@dataclass(frozen=True)
+class _Picture:
+    """What is drawn: its number, how many frames are averaged in it, their mean, and whether Ctrl-C ended it.
+
+    One frame is still on the device, and there is no `image`.
+    """
+
+    number: int
+    averaged: int = 1
+    image: Image | None = None
+    interrupted: bool = False
+
+
+def _pictures(
+    renderer: Renderer, scene: Scene, plan: Plan, arguments: argparse.Namespace, *, seed: int, record: Record | None
+) -> Iterator[_Picture]:
+    """All pictures, up to one that is interrupted after some frames."""
+    with _progress(arguments.frames * arguments.accumulate) as tell:
+        for number in range(arguments.frames):
+            time = number / FRAMES_PER_SECOND
+            if arguments.accumulate == 1:
+                renderer.draw(scene, plan, seed=seed, time=time, record=record)
+                tell()
+                yield _Picture(number)
+                continue
+            mean = Accumulation(renderer, scene, plan, seed=seed, time=time, record=record)
+            interrupted = _add_up(mean, arguments.accumulate, tell)
+            yield _Picture(number, mean.frames, mean.image(), interrupted)
+            if interrupted:
+                return
+
+
+def _add_up(mean: Accumulation, frames: int, tell: Callable[[], object]) -> bool:
+    """Draw `frames` frames. Ctrl-C ends it, and the frames that are done stay; whether that was so."""
+    try:
+        for _ in range(frames):
+            mean.draw()
+            tell()
+    except KeyboardInterrupt:
+        if mean.frames == 0:
+            raise
+        return True
+    return False
 
 
 def _check_files(outputs: list[str], json: Path | None) -> None:
@@ -82,14 +138,19 @@ def _check_files(outputs: list[str], json: Path | None) -> None:
             raise OutputError(f"{file}: is named twice; give each output a file of its own")
 
 
-def _wanted(files: list[str], known: Mapping[str, str]) -> list[str]:
-    """The outputs of the graph that the files need; all images where no file is asked for."""
+def _wanted(files: list[str], known: Mapping[str, str], *, averaged: bool) -> list[str]:
+    """The outputs of the graph that the files need; all images where no file is asked for.
+
+    Frames are averaged in radiance, whatever the files show.
+    """
     names = {"display" if Path(file).suffix.lower() == ".png" else "radiance" for file in files}
     missing = names - known.keys()
     if missing:
         raise OutputError(
             f"graph: has no output '{min(missing)}', which these files need: {', '.join(files)}; add it to [outputs]"
         )
+    if averaged and names:
+        names.add("radiance")
     return [name for name in known if name in (names or IMAGES)]
 
 
@@ -114,10 +175,13 @@ def _notes(scene: Scene, outputs: list[str], frames: int) -> Iterator[str]:
         yield "model.motion: moving models are not drawn yet; they stand still"
 
 
-def _progress(frames: int) -> Iterator[int]:
-    """Frame numbers, with a progress bar on a terminal where there is more than one."""
+@contextmanager
+def _progress(frames: int) -> Iterator[Callable[[], object]]:
+    """What to call after each of `frames` frames: on a terminal, where there is more than one, it moves a bar."""
     if frames == 1 or not sys.stderr.isatty():
-        return iter(range(frames))
+        yield lambda: None
+        return
     from tqdm import tqdm
 
-    return iter(tqdm(range(frames), unit="frame"))
+    with tqdm(total=frames, unit="frame") as bar:
+        yield bar.update

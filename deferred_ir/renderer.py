@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from contextlib import nullcontext
 from numbers import Integral
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import config
+from .accumulation import Accumulation
 from .errors import GraphError, SettingError
 from .executor import Executor
 from .frame import Frame
@@ -87,15 +88,36 @@ class Renderer:
             self._plans[key] = plan
         return self._plans[key]
 
-    def render(self, scene: Scene, *, vpls: int | None = None, seed: int = 0, time: float = 0.0) -> Image:
-        """One image of `scene` at `time` seconds with `vpls` VPLs (None: as many as the graph says)."""
+    def render(
+        self, scene: Scene, *, vpls: int | None = None, seed: int = 0, time: float = 0.0, accumulate: int = 1
+    ) -> Image:
+        """One image of `scene` at `time` seconds with `vpls` VPLs (None: as many as the graph says).
+
+        accumulate: frames with fresh samples that are averaged in it; `Accumulation` adds them up one by one.
+        """
+        if not isinstance(accumulate, Integral) or accumulate < 1:
+            raise SettingError(f"accumulate {accumulate!r}: wants a whole number of 1 or more")
         images = [name for name in self.graph(vpls).outputs if name in IMAGES]
         plan = self.plan(scene, vpls, images)
-        self.draw(scene, plan, seed=seed, time=time)
-        return self.read(plan)
+        if accumulate == 1:
+            self.draw(scene, plan, seed=seed, time=time)
+            return self.read(plan)
+        mean = Accumulation(self, scene, plan, seed=seed, time=time)
+        for _ in range(accumulate):
+            mean.draw()
+        return mean.image()
 
-    def draw(self, scene: Scene, plan: Plan, *, seed: int = 0, time: float = 0.0, record: Record | None = None) -> None:
-        """Draw one whole frame and wait for it; what it took is added to `record`."""
+    def draw(
+        self,
+        scene: Scene,
+        plan: Plan,
+        *,
+        seed: int = 0,
+        time: float = 0.0,
+        record: Record | None = None,
+        steps: Container[str] | None = None,
+    ) -> None:
+        """Draw one frame and wait for it; what it took is added to `record`. steps: those to run, None for all."""
         if not isinstance(seed, Integral) or seed < 0:
             raise SettingError(f"seed {seed!r}: wants a whole number of 0 or more")
         if self._closed:
@@ -107,7 +129,7 @@ class Renderer:
             frame = Frame(self.size, scene.at(time), self._buffers, self.tracer, seed, time)
             timers = self._timers if record else None
             with timers.frame() if timers else nullcontext():
-                self.executor.run(plan, frame, timers)
+                self.executor.run(plan, frame, timers, steps=steps)
             self.gpu.ctx.finish()
             if record and timers:
                 record.frame_ms.append((clock.perf_counter() - start) * 1e3)

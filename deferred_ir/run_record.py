@@ -18,16 +18,23 @@ if TYPE_CHECKING:
 
 
 def run_record(
-    renderer: Renderer, scene: Scene, graph_name: str, graph: Graph, plan: Plan, *, seed: int, record: Record
+    renderer: Renderer,
+    scene: Scene,
+    graph_name: str,
+    graph: Graph,
+    plan: Plan,
+    *,
+    seed: int,
+    record: Record,
+    accumulated: int = 1,
 ) -> dict[str, Any]:
-    """The record of a run as plain data, in the order of the contract."""
+    """The record of a run as plain data, in the order of the contract. accumulated: frames averaged in an image."""
     casting = graph.nodes.get("vpl")
     last = record.counters[-1]
     passes: list[dict[str, Any]] = [dict(entry) for entry in record.passes()]
     for entry in passes:
-        step = next(step for step in plan.steps if step.name == entry["name"])
-        subpasses = step.work.subpasses(step.descriptions)
-        if subpasses:
+        step = next((step for step in plan.steps if step.name == entry["name"]), None)
+        if step and (subpasses := step.work.subpasses(step.descriptions)):
             alive = subpasses[: last.get("maps_drawn", len(subpasses))]
             entry["subpasses"] = [dict(subpass) for subpass in alive]
     return {
@@ -42,6 +49,7 @@ def run_record(
         "seed": seed,
         "device": renderer.gpu.device.name,
         "frames": len(record.frame_ms),
+        "accumulated": accumulated,
         "frame_ms": record.median_frame_ms(),
         "passes": passes,
         "maps_drawn": [counters.get("maps_drawn", 0) for counters in record.counters],

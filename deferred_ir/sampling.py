@@ -19,7 +19,7 @@ Pattern = Literal["random", "stratified", "halton", "sobol"]
 PATTERNS: tuple[str, ...] = get_args(Pattern)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=8)
 def unit_square(pattern: Pattern, count: int, seed: int) -> Array:
     """`count` points in [0, 1)^2, float64 (count, 2), the same for the same arguments. Read-only: it is cached."""
     points = _points(pattern, count, seed)
@@ -27,12 +27,20 @@ def unit_square(pattern: Pattern, count: int, seed: int) -> Array:
     return points
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=8)
 def unit_disc(pattern: Pattern, count: int, seed: int) -> Array:
     """`unit_square` mapped to the unit disc. Read-only: it is cached, for frames that repeat a seed."""
     points = disc(unit_square(pattern, count, seed))
     points.flags.writeable = False
     return points
+
+
+def frame_seed(seed: int, frame: int) -> int:
+    """The seed of frame `frame` of those that are averaged under `seed`: `seed` itself, then numbers of 31 bits.
+
+    They are mixed from both, so that frames under one seed are none of those under another.
+    """
+    return seed if frame == 0 else int(np.random.SeedSequence([seed, frame]).generate_state(1)[0] >> 1)
 
 
 def warn_unbalanced(pattern: Pattern, count: int) -> None:

@@ -15,6 +15,17 @@ class Record:
     laps: list[dict[str, tuple[float, float]]] = field(default_factory=list)
     counters: list[dict[str, int]] = field(default_factory=list)
 
+    def join(self, parts: Record) -> None:
+        """Add one frame that was drawn in parts: times are added up, counters stay those of each part."""
+        laps: dict[str, tuple[float, float]] = {}
+        for lap in parts.laps:
+            for label, (gpu, cpu) in lap.items():
+                before = laps.get(label, (0.0, 0.0))
+                laps[label] = before[0] + gpu, before[1] + cpu
+        self.frame_ms.append(sum(parts.frame_ms))
+        self.laps.append(laps)
+        self.counters += parts.counters
+
     def passes(self) -> list[dict[str, float | str]]:
         """Name, GPU and CPU median of each pass, in the order in which they ran."""
         names = list(dict.fromkeys(label for frame in self.laps for label in frame))

@@ -1,0 +1,102 @@
+"""The mean of many frames with fresh samples: progressive rendering, for any graph.
+
+What the graph calls `radiance` is averaged in 64 bits, put back in its place, and the passes that read it run on that
+mean: so display pixels come from the graph's own tone map, of the mean, not from a mean of display pixels.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import GraphError
+from .graph import Plan
+from .image import Image
+from .sampling import frame_seed
+from .scene import Scene
+from .timing import Record
+
+if TYPE_CHECKING:
+    from .renderer import Renderer
+
+LAP = "accumulate"
+"""What the time is called that adding up takes."""
+
+
+class Accumulation:
+    """Draws frames of `scene` at `time`, one by one, and averages them; frame k of seed s has frame_seed(s, k).
+
+    plan: one with the output radiance; all else that it makes images of must be made of that. record: gets one frame
+    for each image, its time all that was drawn for it, and the counters of each frame drawn. Raises GraphError where
+    the plan does not fit.
+    """
+
+    def __init__(
+        self,
+        renderer: Renderer,
+        scene: Scene,
+        plan: Plan,
+        *,
+        seed: int = 0,
+        time: float = 0.0,
+        record: Record | None = None,
+    ) -> None:
+        origin = renderer.graph().origin
+        if "radiance" not in plan.outputs:
+            raise GraphError(f"{origin}: has no output 'radiance', which is what frames are averaged in; add it")
+        self._source = plan.outputs["radiance"]
+        self._late = readers(plan, self._source)
+        self._early = {step.name for step in plan.steps} - self._late
+        if plan.outputs.get("display", self._source)[0] in self._early - {self._source[0]}:
+            raise GraphError(
+                f"{origin}: outputs.display: is not made of outputs.radiance, so it cannot show the mean of frames; "
+                "ask for .npy or .exr only, or for one frame"
+            )
+        self._renderer, self._scene, self._plan, self._seed, self._time = renderer, scene, plan, seed, time
+        self._record, self._parts = record, Record() if record else None
+        self._adding_ms = 0.0
+        self._sum: tuple[int, Any] = 0, 0.0
+
+    @property
+    def frames(self) -> int:
+        """How many frames the mean is of."""
+        return self._sum[0]
+
+    def draw(self) -> None:
+        """Draw the next frame and add it. One that is broken off, by Ctrl-C say, has never been."""
+        done, total = self._sum
+        self._run(frame_seed(self._seed, done), self._early)
+        start = clock.perf_counter()
+        with self._renderer.gpu.ctx:
+            pixels = self._renderer.executor.resource(self._source).read()
+        self._sum = done + 1, total + pixels.astype(np.float64)  # at once, whenever an interrupt comes
+        self._adding_ms += (clock.perf_counter() - start) * 1e3
+
+    def image(self) -> Image:
+        """The mean of the frames so far, one at least."""
+        done, total = self._sum
+        with self._renderer.gpu.ctx:
+            self._renderer.executor.resource(self._source).upload(total / done)
+        self._run(self._seed, self._late)
+        if self._record and self._parts:
+            self._renderer.finish(self._parts)
+            self._parts.counters.pop()  # of the passes that came after the frames
+            self._parts.frame_ms.append(self._adding_ms)
+            self._parts.laps.insert(-1, {LAP: (self._adding_ms, self._adding_ms)})
+            self._record.join(self._parts)
+            self._parts, self._adding_ms = Record(), 0.0
+        return self._renderer.read(self._plan)
+
+    def _run(self, seed: int, steps: set[str]) -> None:
+        self._renderer.draw(self._scene, self._plan, seed=seed, time=self._time, record=self._parts, steps=steps)
+
+
+def readers(plan: Plan, source: tuple[str, str]) -> set[str]:
+    """Names of the steps that read what `source` (pass, port) wrote, themselves or through others."""
+    found: set[str] = set()
+    for step in plan.steps:
+        if any(wire and (wire == source or wire[0] in found) for wire in step.sources.values()):
+            found.add(step.name)
+    return found

@@ -6,19 +6,36 @@ import numpy as np
 
 from .frame import Frame
 from .gl.cluster_buffers import ClusterBuffers
+from .io import Io
 from .maps import MapParams
-from .typing import Bools
+from .subdivision import subdivide
+from .typing import Array, Bools, Ints
 
 
 def of_vpls(frame: Frame, params: MapParams) -> ClusterBuffers:
     """What the maps of VPLs draw."""
-    del params
-    return frame.buffers.cluster_buffers
+    if params.projection != "paraboloid" or params.tessellation != "pre":
+        return frame.buffers.cluster_buffers
+    geometry = frame.scene.geometry
+
+    def make() -> tuple[Array, Ints]:
+        return subdivide(geometry.positions, geometry.faces, params.edge * geometry.diagonal)
+
+    return frame.buffers.stand_in(("edge", params.edge), make)
 
 
 def shares(frame: Frame, params: MapParams, records: np.ndarray) -> list[tuple[ClusterBuffers, Bools]]:
     """Meshes, and which of the lights with LIGHT records (n,) draw each, bool (n,). The spotlight draws the scene."""
-    own, other, vpls = frame.buffers.cluster_buffers, of_vpls(frame, params), records["tile"] >= 0
+    own, vpls = frame.buffers.cluster_buffers, records["tile"] >= 0
+    other = of_vpls(frame, params) if vpls.any() else own
     if other is own:
         return [(own, np.ones(len(records), bool))]
     return [(mesh, lights) for mesh, lights in ((own, ~vpls), (other, vpls)) if lights.any()]
+
+
+def count(frame: Frame, io: Io, params: MapParams) -> None:
+    """Publish how large the mesh is that stands in for the scene, if one does."""
+    mesh = of_vpls(frame, params)
+    if mesh is not frame.buffers.cluster_buffers:
+        io.count("stand_in_triangles", int(mesh.clusters.sizes.sum()))
+        io.count("stand_in_bytes", mesh.mesh_bytes)

@@ -47,6 +47,11 @@ class MapParams:
     bend: float = param(
         4.0, lo=0.1, hi=16.0, doc="Paraboloid maps: edges that may be off by more texels than this are split."
     )
+    tessellation: Literal["adaptive", "pre"] = param(
+        "adaptive",
+        doc="Paraboloid maps of VPLs: split in each map what bends there, or draw a mesh without long edges straight.",
+    )
+    edge: float = param(0.05, lo=1e-4, hi=1.0, doc="Longest edge of that mesh, as a fraction of the scene's diagonal.")
     cull: Literal["none", "front"] = param(
         "none", doc="front: draw back faces only, which moves the bias to the dark side; for closed meshes."
     )

@@ -25,12 +25,14 @@ def draw(mesh: ClusterBuffers, io: Io, params: MapParams, records: np.ndarray, c
     """
     gpu, clusters = io.gpu, mesh.clusters
     visible = clusters.visible(records, hemisphere=True) & chosen[:, None]
-    bent = clusters.bent(records, params.reach(records))
+    straight = params.tessellation == "pre" and (records["tile"][chosen] >= 0).all()
+    bent = np.False_ if straight else clusters.bent(records, params.reach(records))
     gpu.clip(5)  # behind the light, and the map's four sides
     geometry = ["paraboloid.geom"] if layered and not gpu.layer_from_vertex else []
     for split, share in ((False, visible & ~bent), (True, visible & bent)):
         if share.any():
             files = [*FILES, *(SPLIT if split else ()), *geometry]
-            program = io.program(*files, defines={"SPLIT": int(split), "BEND": float(params.bend)})
+            defines = {"SPLIT": int(split), "STRAIGHT": int(straight), "BEND": float(params.bend)}
+            program = io.program(*files, defines=defines)
             mesh.draw(program, share, patches=split)
     gpu.clip(0)

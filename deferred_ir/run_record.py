@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,10 +54,17 @@ def run_record(
         "frame_ms": record.median_frame_ms(),
         "passes": passes,
         "maps_drawn": [counters.get("maps_drawn", 0) for counters in record.counters],
+        "stand_in": _stand_in(last),
         "left_out": [{"what": name, "why": why, "ms": None, "bytes": None} for name, why in plan.left_out.items()],
         "bias": _bias(renderer, scene, graph, plan),
         "memory_bytes": renderer.memory(),
     }
+
+
+def _stand_in(counters: Mapping[str, int]) -> dict[str, int] | None:
+    """Triangles and bytes of the mesh that maps of VPLs drew, None where it was the scene's own."""
+    names = ("triangles", "bytes")
+    return {name: counters[f"stand_in_{name}"] for name in names} if "stand_in_bytes" in counters else None
 
 
 def _bias(renderer: Renderer, scene: Scene, graph: Graph, plan: Plan) -> dict[str, float] | None:

@@ -64,6 +64,8 @@ class PlainMaps(Pass):
                 program.set(light_number=number)
                 (frame.buffers.draw if mesh is own else mesh.draw_all)(program)
         io.count("maps_drawn", total)
+        if total > 1:
+            map_meshes.count(frame, io, self.params)
 
 
 PASS = PlainMaps

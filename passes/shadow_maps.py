@@ -77,6 +77,8 @@ class ShadowMaps(Pass):
                 if (drawn & curved).any():
                     paraboloid_maps.draw(mesh, io, self.params, records, drawn & curved, layered=True)
         io.count("maps_drawn", total)
+        if total > 1:
+            map_meshes.count(frame, io, self.params)
 
 
 def _lights(inputs: Mapping[str, Description | None]) -> int:

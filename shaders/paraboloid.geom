@@ -27,6 +27,10 @@ void main() {
         part.light = corner[i].light;
         part.edges = corner[i].edges;
         part.plane = corner[i].plane;
+#elif STRAIGHT
+        part.ndc = corner[i].ndc;
+        part.light = corner[i].light;
+        part.seen = corner[i].seen;
 #else
         part.seen = corner[i].seen;
 #endif

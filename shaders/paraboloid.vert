@@ -22,6 +22,10 @@ void main() {
     corner = d;
 #else
     part.seen = d;
-    place(light, d);
+    vec2 map_ndc = place(light, d);
+#if STRAIGHT
+    part.ndc = map_ndc;
+    part.light = light_index;
+#endif
 #endif
 }

@@ -157,6 +157,8 @@ OPTIONS = [
     {"shadow_maps.projection": "paraboloid", "vpl.fov": 179.9},
     {"shadow_maps.projection": "paraboloid", "vpl.fov": 60.0, "shadow_maps.bend": 0.25},
     {"shadow_maps.projection": "paraboloid", "shadow_maps.cull": "front", "shadow_maps.vpl_size": 100},
+    {"shadow_maps.projection": "paraboloid", "shadow_maps.tessellation": "pre", "vpl.fov": 179.9},
+    {"shadow_maps.projection": "paraboloid", "shadow_maps.tessellation": "pre", "shadow_maps.edge": 0.2},
     {"shadow_maps.spot_kernel": 7.0},
     {"shadow_maps.vpl_kernel": 5.0},
     {"shadow_maps.vpl_kernel": 12.0, "shadow_maps.vpl_taps": 20, "shadow_maps.vpl_size": 32},

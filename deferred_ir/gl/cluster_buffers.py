@@ -35,6 +35,12 @@ class ClusterBuffers:
         """Size of all buffers."""
         return sum(buffer.size for buffer in (self._indices, self._lights, self._commands))
 
+    @property
+    def mesh_bytes(self) -> int:
+        """Size of vertices and indices alone."""
+        size: int = self._positions.size + self._indices.size
+        return size
+
     def draw_all(self, program: Program) -> None:
         """Draw all triangles once. The program reads `position` alone."""
         self._array(program).render(self.gpu.ctx.TRIANGLES)

@@ -96,7 +96,8 @@ class Executor:
             outputs = {port: ports[step.name, port] for port in step.outputs}
             io = Io(self.library, step, {**inputs, **outputs}, written, self.counters)
             attached = {port: inputs[port] for port, declared in step.work.inputs.items() if declared.attach}
-            targets = {port: r for port, r in {**outputs, **attached}.items() if isinstance(r, GpuTexture)}
+            drawn = {port: ports[step.name, port] for port, output in step.outputs.items() if output.attach}
+            targets = {port: r for port, r in {**drawn, **attached}.items() if isinstance(r, GpuTexture)}
             if targets:
                 self._framebuffers.append(Framebuffer(self.gpu, targets, step.name))
                 io.attach(self._framebuffers[-1])

@@ -71,11 +71,15 @@ class Input:
 
 @dataclass(frozen=True)
 class Output:
-    """A port that writes. `defines` tell the readers' shaders what they must know of the writer (layout, encoding)."""
+    """A port that writes. `defines` tell the readers' shaders what they must know of the writer (layout, encoding).
+
+    `attach` False: a texture that shaders store into wherever they like, instead of a target of the pass's framebuffer.
+    """
 
     doc: str
     description: Description
     defines: Mapping[str, int | float] = field(default_factory=dict)
+    attach: bool = True
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ class Lighting(Pass):
         "normals": Input("shading and geometric normal", format="rgba16"),
         "albedo": Input("reflectance", format="rgba16f"),
         "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
+        "indirect": Input("irradiance from the VPLs, instead of adding them up", format="rgba32f", optional=True),
         "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
         "blockers": Input("the same maps: what hides a part of the spotlight's disc", format="depth32f", optional=True),
     }
@@ -39,9 +40,10 @@ class Lighting(Pass):
         ctx, lights = io.gpu.ctx, io["lights"]
         program = io.program("lighting.frag", defines={"DISC": int(is_disc(lights.records))})
         ctx.blend_func = ctx.ONE, ctx.ONE
-        for start in range(0, len(lights.records), LIGHTS_PER_BLOCK):
+        total = 1 if io["indirect"] else len(lights.records)
+        for start in range(0, total, LIGHTS_PER_BLOCK):
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
-            program.set(first=int(start == 0), count=min(LIGHTS_PER_BLOCK, len(lights.records) - start))
+            program.set(first=int(start == 0), count=min(LIGHTS_PER_BLOCK, total - start))
             program.draw_fullscreen()
             ctx.enable(ctx.BLEND)
 

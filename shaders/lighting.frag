@@ -7,7 +7,9 @@
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 layout(binding = UNIT_ALBEDO) uniform sampler2D albedo;
-#if HAS_NEAR_FIELD
+#if HAS_INDIRECT
+layout(binding = UNIT_INDIRECT) uniform sampler2D indirect;
+#elif HAS_NEAR_FIELD
 layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
 #endif
 uniform int first;  // light of this block to start with; 1 where light 0 is the spotlight
@@ -30,7 +32,9 @@ void main() {
     if (first == 1)
         irradiance = spot_irradiance(lights[0], position, normal, shading_normal)
                    * SPOT_VISIBILITY(lights[0]);
-#if HAS_NEAR_FIELD
+#if HAS_INDIRECT  // with the near field in it
+    irradiance += texelFetch(indirect, pixel, 0).rgb;
+#elif HAS_NEAR_FIELD
     if (first == 1) irradiance += texelFetch(near_field, pixel, 0).rgb;
 #endif
     for (int i = first; i < count; ++i)

@@ -57,6 +57,10 @@ class Gpu:
         self.gl.DepthMask(1)
         self.gl.ColorMask(1, 1, 1, 1)
 
+    def barrier(self) -> None:
+        """Let later draws see what shaders stored into images so far."""
+        self.gl.MemoryBarrier(raw.IMAGE_ACCESS_BARRIER | raw.TEXTURE_FETCH_BARRIER)
+
     def clip(self, count: int) -> None:
         """Clip by the first `count` of gl_ClipDistance, and by no other."""
         for side in range(min(count, self._clipped), max(count, self._clipped)):

@@ -14,6 +14,7 @@ _U, _I, _F, _P = ctypes.c_uint, ctypes.c_int, ctypes.c_float, ctypes.c_void_p
 _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "ActiveTexture": (None, _U),
     "BindFramebuffer": (None, _U, _U),
+    "BindImageTexture": (None, _U, _U, _I, ctypes.c_ubyte, _I, _U, _U),
     "BindTexture": (None, _U, _U),
     "CheckFramebufferStatus": (_U, _U),
     "ClearBufferfv": (None, _U, _I, _P),
@@ -34,6 +35,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "GetIntegerv": (None, _U, _P),
     "GetQueryObjectui64v": (None, _U, _U, _P),
     "GetTexImage": (None, _U, _I, _U, _U, _P),
+    "MemoryBarrier": (None, _U),
     "PixelStorei": (None, _U, _I),
     "QueryCounter": (None, _U, _U),
     "TexStorage2D": (None, _U, _I, _U, _I, _I),
@@ -50,6 +52,7 @@ LOWER_LEFT, ZERO_TO_ONE = 0x8CA1, 0x935F
 TIMESTAMP, QUERY_RESULT = 0x8E28, 0x8866
 CLIP_DISTANCE0 = 0x3000
 MAX_TEXTURE_SIZE, MAX_ARRAY_LAYERS, MAX_VIEWPORT_DIMS = 0x0D33, 0x88FF, 0x0D3A
+READ_WRITE, IMAGE_ACCESS_BARRIER, TEXTURE_FETCH_BARRIER = 0x88BA, 0x20, 0x8
 OUT_OF_MEMORY = 0x0505
 
 

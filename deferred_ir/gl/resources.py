@@ -81,6 +81,10 @@ class GpuTexture:
         self.gpu.gl.BindTexture(self.target, self.glo)
         sampler.use(unit)
 
+    def bind_image(self, unit: int) -> None:
+        """Let shaders load and store its texels through image `unit`."""
+        self.gpu.gl.BindImageTexture(unit, self.glo, 0, 0, 0, raw.READ_WRITE, self.format.internal)
+
     def read(self) -> np.ndarray:
         """All texels, (H, W, channels) or (layers, H, W, channels), bottom row first."""
         layers = (self.description.layers,) if self.description.layers else ()

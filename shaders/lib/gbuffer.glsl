@@ -7,12 +7,17 @@ vec2 octahedral(vec3 n) {
     return (n.z < 0.0 ? folded : n.xy) * 0.5 + 0.5;
 }
 
-vec3 from_octahedral(vec2 code) {
+// Along the normal, of any length.
+vec3 octahedron(vec2 code) {
     vec2 p = code * 2.0 - 1.0;
     vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
     float fold = max(-n.z, 0.0);
     n.xy -= vec2(n.x < 0.0 ? -fold : fold, n.y < 0.0 ? -fold : fold);
-    return normalize(n);
+    return n;
+}
+
+vec3 from_octahedral(vec2 code) {
+    return normalize(octahedron(code));
 }
 
 vec4 encode_normals(vec3 shading, vec3 geometric) {

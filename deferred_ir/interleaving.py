@@ -1,0 +1,37 @@
+"""Interleaved sampling (Keller and Heidrich 2001): which VPLs light which pixels, and where those pixels stand.
+
+Each pixel of an n x n block is lit by a share of the VPLs. Pixels with the same share stand together in a sub-buffer
+(Segovia et al. 2006), so that one draw with one list of lights serves them all: pixel (x, y) has the share
+(y mod n) n + x mod n. shaders/lib/interleave.glsl finds the same places.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .typing import Ints
+
+SHUFFLE = 8191
+"""Seed of the permutation, the same in every frame."""
+
+
+def deal(count: int, n: int) -> tuple[Ints, Ints]:
+    """Deal `count` VPLs to the n^2 shares: order, int (count,), and starts, int (n^2 + 1,).
+
+    Share s has the VPLs order[starts[s]:starts[s + 1]]. Every VPL is in one share, and shares differ by one at most.
+    The order is shuffled, so that what is left of the pattern has no structure.
+    """
+    order = np.random.Generator(np.random.PCG64(SHUFFLE)).permutation(count)
+    return order, np.arange(n * n + 1) * count // (n * n)
+
+
+def sub_buffers(size: tuple[int, int], n: int) -> list[tuple[int, int, int, int]]:
+    """Rectangle (x, y, width, height) of each share in a texture of `size`; one may be a pixel larger than the next."""
+    columns, rows = (_parts(length, n) for length in size)
+    return [(x, y, width, height) for y, height in rows for x, width in columns]
+
+
+def _parts(length: int, n: int) -> list[tuple[int, int]]:
+    """Start and length of the part that holds every n-th of `length` pixels, for each of the n offsets."""
+    whole, rest = divmod(length, n)
+    return [(i * whole + min(i, rest), whole + (i < rest)) for i in range(n)]

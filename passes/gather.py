@@ -1,0 +1,81 @@
+"""Put sub-buffers together and filter the pattern away inside surfaces: shares, G-buffer, lights -> irradiance.
+
+A window of n x n pixels has each share once wherever it lies; the mean over the neighbours on the pixel's own surface
+is what all VPLs give there (Laine et al. 2007, section 5.2). Where too few count, on thin things, all VPLs are asked:
+those pixels are packed into rows of a second draw, so that no processor idles beside them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import cos, radians, sin
+from typing import ClassVar
+
+from deferred_ir.frame import Frame
+from deferred_ir.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.io import Io
+from deferred_ir.params import param
+
+IRRADIANCE, THIN, COUNT = 0, 1, 2
+"""Image units that the shaders declare."""
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of the filter."""
+
+    angle: float = param(
+        25.0,
+        lo=0.0,
+        hi=180.0,
+        doc="Neighbours count whose normals differ by less, and that lie half as much off the plane.",
+    )
+    fewest: float = param(0.5, lo=0.0, hi=1.0, doc="Where no larger share of the window counts, all VPLs are asked.")
+
+
+class Gather(Pass):
+    """A box filter that stops at edges."""
+
+    Params = Params
+    inputs: ClassVar[Mapping[str, Input]] = {
+        "vpls": Input("the VPLs in the order of their shares", format="share"),
+        "shares": Input("irradiance in sub-buffers", format="rgba32f"),
+        "depth": Input("reversed depth", format="depth32f"),
+        "normals": Input("shading and geometric normal", format="rgba16"),
+        "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
+    }
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Irradiance of the frame's size, and the pixels that the window is not enough for."""
+        del inputs
+        return {
+            "irradiance": Output("irradiance from the VPLs", Texture("rgba32f")),
+            "thin": Output("pixels lit by all VPLs, row by row", Texture("r32ui"), attach=False),
+            "count": Output("how many", Texture("r32ui", (1, 1)), attach=False),
+        }
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Filter, then light the pixels that it left."""
+        del frame
+        gpu, vpls = io.gpu, io["vpls"]
+        for unit, name in ((IRRADIANCE, "irradiance"), (THIN, "thin"), (COUNT, "count")):
+            io[name].bind_image(unit)
+        io["count"].upload([[0]])
+        angle, shares = radians(self.params.angle), io.defines["INTERLEAVE"] ** 2
+        program = io.program("gather.frag")
+        program.set(
+            cosine_squared=cos(angle) ** 2, sine_squared=sin(angle / 2) ** 2, fewest=self.params.fewest * shares
+        )
+        program.draw_fullscreen()
+        program = io.program("thin.frag", "thin.vert")
+        gpu.gl.ColorMask(0, 0, 0, 0)  # the shader stores where each pixel belongs
+        for start in range(0, len(vpls.records), vpls.description.block):
+            gpu.barrier()
+            vpls.bind_uniform(1, start // vpls.description.block)
+            program.set(end=min(vpls.description.block, len(vpls.records) - start))
+            program.draw_fullscreen()
+        gpu.barrier()
+
+
+PASS = Gather

@@ -1,0 +1,55 @@
+"""Deal the VPLs to the pixels of a block (Keller and Heidrich 2001): lights -> vpls, in the order of their shares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+from deferred_ir.errors import GraphError
+from deferred_ir.frame import Frame
+from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass
+from deferred_ir.interleaving import deal
+from deferred_ir.io import Io
+from deferred_ir.params import param
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of interleaved sampling."""
+
+    n: int = param(4, lo=1, hi=8, doc="Edge of a block, 1, 2, 4 or 8 pixels; each pixel gets 1/n^2 of the VPLs.")
+
+
+class Interleave(Pass):
+    """The VPLs, without the spotlight, one share after the other."""
+
+    Params = Params
+    inputs: ClassVar[Mapping[str, Input]] = {"lights": Input("the spotlight, then the VPLs", format="light")}
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """A buffer of as many lights."""
+        lights, n = inputs["lights"], self.params.n
+        assert isinstance(lights, Buffer)
+        if n & (n - 1):
+            raise GraphError(f"n {n}: wants 1, 2, 4 or 8")
+        vpls = Buffer("share", lights.records, lights.stride, lights.block)
+        return {
+            "vpls": Output(
+                "the VPLs in the order of their shares", vpls, {"INTERLEAVE": n, "LIGHTS_PER_BLOCK": lights.block}
+            )
+        }
+
+    def unneeded(self, facts: Facts) -> str | None:
+        """With one share there is nothing to deal."""
+        del facts
+        return "n is 1: every pixel is lit by all VPLs" if self.params.n == 1 else None
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Shuffle and upload."""
+        del frame
+        vpls = io["lights"].records[1:]
+        io["vpls"].write(vpls[deal(len(vpls), self.params.n)[0]])
+
+
+PASS = Interleave

@@ -1,0 +1,53 @@
+"""Light each pixel by its share of the VPLs: vpls, G-buffer, shadows -> irradiance, in sub-buffers.
+
+Pixels with the same share stand together (Segovia et al. 2006), so that each draw has one list of lights. The G-buffer
+is read with stride n, not copied.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from deferred_ir.frame import Frame
+from deferred_ir.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.interleaving import deal, sub_buffers
+from deferred_ir.io import Io
+
+
+class Interleaved(Pass):
+    """Irradiance from n^2 times a pixel's share of the VPLs."""
+
+    inputs: ClassVar[Mapping[str, Input]] = {
+        "vpls": Input("the VPLs in the order of their shares", format="share"),
+        "depth": Input("reversed depth", format="depth32f"),
+        "normals": Input("shading and geometric normal", format="rgba16"),
+        "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
+    }
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Irradiance before albedo, which the filter must not blur."""
+        del inputs
+        return {"shares": Output("irradiance in sub-buffers; 0 on the background", Texture("rgba32f"))}
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """A draw for each share, or more where it crosses from block to block of the buffer."""
+        vpls, n = io["vpls"], io.defines["INTERLEAVE"]
+        ctx, block = io.gpu.ctx, vpls.description.block
+        program = io.program("interleaved.frag")
+        io.framebuffer.clear_color()
+        ctx.enable(ctx.BLEND)
+        ctx.blend_func = ctx.ONE, ctx.ONE
+        starts = deal(len(vpls.records), n)[1].tolist()
+        for share, rectangle in enumerate(sub_buffers(frame.size, n)):
+            io.gpu.gl.Viewport(*rectangle)
+            start, stop = starts[share : share + 2]
+            # An empty share is drawn as well: the filter counts its pixels.
+            for number in range(start // block, max(stop - 1, start) // block + 1):
+                vpls.bind_uniform(1, number)
+                first, end = max(start - number * block, 0), min(stop - number * block, block)
+                program.set(share=(share % n, share // n), begins=first + number * block == start, first=first, end=end)
+                program.draw_fullscreen()
+
+
+PASS = Interleaved

@@ -1,0 +1,32 @@
+// Irradiance from VPLs first to end of a block of lights, on the pixels of one share, in its sub-buffer.
+#include "lib/frame.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/light.glsl"
+#include "lib/visibility.glsl"
+#include "lib/interleave.glsl"
+
+layout(binding = UNIT_DEPTH) uniform sampler2D depth;
+layout(binding = UNIT_NORMALS) uniform sampler2D normals;
+uniform ivec2 share;
+uniform bool begins;  // the first of a share's draws, which later ones are added to
+uniform int first;
+uniform int end;
+
+layout(location = 0) out vec4 irradiance;  // alpha: the shading normal, for the filter
+
+void main() {
+    ivec2 size = textureSize(depth, 0);
+    ivec2 pixel = whole_place(ivec2(gl_FragCoord.xy), share, size);
+    float d = texelFetch(depth, pixel, 0).r;
+    if (d <= 0.0) {  // background
+        irradiance = vec4(0.0);
+        return;
+    }
+    vec3 position = unproject((vec2(pixel) + 0.5) / vec2(size) * 2.0 - 1.0, d);
+    vec4 code = texelFetch(normals, pixel, 0);
+    vec3 shading_normal = from_octahedral(code.xy), normal = from_octahedral(code.zw);
+    vec3 sum = vec3(0.0);
+    for (int i = first; i < end; ++i)
+        sum += vpl_irradiance(lights[i], position, normal, shading_normal) * VPL_VISIBILITY(lights[i]);
+    irradiance = vec4(sum * float(INTERLEAVE * INTERLEAVE), begins ? pack_normal(code.xy) : 0.0);
+}

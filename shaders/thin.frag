@@ -1,0 +1,24 @@
+// All VPLs of a block, at a pixel of the list; added to what is known there.
+#include "lib/frame.glsl"
+#include "lib/gbuffer.glsl"
+#include "lib/light.glsl"
+#include "lib/visibility.glsl"
+#include "lib/thin.glsl"
+
+layout(binding = UNIT_DEPTH) uniform sampler2D depth;
+layout(binding = UNIT_NORMALS) uniform sampler2D normals;
+layout(binding = 0, rgba32f) uniform image2D irradiance;
+uniform int end;
+
+void main() {
+    ivec2 place = ivec2(gl_FragCoord.xy), size = textureSize(depth, 0);
+    if (uint(place.y * size.x + place.x) >= imageLoad(count, ivec2(0)).r) return;
+    ivec2 pixel = thin_place(imageLoad(thin, place).r, size.x);
+    vec3 position = unproject((vec2(pixel) + 0.5) / vec2(size) * 2.0 - 1.0, texelFetch(depth, pixel, 0).r);
+    vec4 code = texelFetch(normals, pixel, 0);
+    vec3 shading_normal = from_octahedral(code.xy), normal = from_octahedral(code.zw);
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < end; ++i)
+        sum += vpl_irradiance(lights[i], position, normal, shading_normal) * VPL_VISIBILITY(lights[i]);
+    imageStore(irradiance, pixel, imageLoad(irradiance, pixel) + vec4(sum, 0.0));
+}

@@ -1,6 +1,6 @@
 """What shadow maps cost in accuracy: the same VPLs with maps and with ray-cast visibility, both held against truth.
 
-    python -m deferred_ir.profiling.maps_and_rays cornell colors atrium --vpls 256 --seeds 5
+    python -m deferred_ir.profiling.maps_and_rays cornell colors atrium --graphs deferred,hemisphere --seeds 5
 
 Truth is path-traced (`--spp`), or `--reference F.npz` with arrays image, direct and hit, for one scene.
 """
@@ -22,16 +22,19 @@ from deferred_ir.scene import Scene
 from deferred_ir.scene_file import parse_size
 
 
-def measure(scene: Scene, truth: Mapping[str, Any], size: tuple[int, int], vpls: int, seeds: int) -> dict[str, Any]:
+def measure(
+    scene: Scene, truth: Mapping[str, Any], *, graph: str, size: tuple[int, int], vpls: int, seeds: int
+) -> dict[str, Any]:
     """relMSE of maps and of rays, one a seed, and the mean ratio of their indirect light."""
     image, direct, hit = (np.asarray(truth[key]) for key in ("image", "direct", "hit"))
     maps, rays, ratios = [], [], []
-    with Renderer(size, "deferred") as renderer:
+    with Renderer(size, graph) as renderer:
+        cone = {"vpl.fov": renderer.graph().nodes["vpl"].work.params.fov}
         plan = renderer.plan(scene, vpls, ["radiance"])
         for seed in tqdm(range(seeds), desc=scene.name, disable=None):
             renderer.draw(scene, plan, seed=seed)
             mapped = renderer.read(plan).radiance
-            traced = reference(scene, size, vpls=vpls, seed=seed)
+            traced = reference(scene, size, vpls=vpls, seed=seed, settings=cone)
             maps.append(relmse(mapped, image, hit)[0])
             rays.append(relmse(traced.radiance, image, hit)[0])
             ratios.append((mapped - direct)[hit].mean() / traced.indirect[hit].mean())
@@ -42,14 +45,15 @@ def main() -> None:
     """Print a Markdown table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("scenes", nargs="+", metavar="SCENE")
+    parser.add_argument("--graphs", type=lambda text: text.split(","), default=["deferred"], metavar="A,B")
     parser.add_argument("--vpls", type=int, default=256)
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--size", type=parse_size, default=(256, 256))
     parser.add_argument("--spp", type=int, default=1024)
     parser.add_argument("--reference", metavar="F.npz")
     arguments = parser.parse_args()
-    print("| scene | relMSE with maps | relMSE with rays | maps / rays | indirect light, maps / rays |")
-    print("|---|---|---|---|---|")
+    print("| scene | graph | relMSE with maps | relMSE with rays | maps / rays | indirect light, maps / rays |")
+    print("|---" * 6 + "|")
     for name in arguments.scenes:
         scene = load(name)
         if arguments.reference:
@@ -57,13 +61,16 @@ def main() -> None:
         else:
             traced = reference(scene, arguments.size, spp=arguments.spp)
             truth = {"image": traced.radiance, "direct": traced.direct, "hit": traced.hit}
-        found = measure(scene, truth, arguments.size, arguments.vpls, arguments.seeds)
-        maps, rays = np.mean(found["maps"]), np.mean(found["rays"])
-        cells = [
-            f"{mean:.4f} ({min(found[key]):.4f} to {max(found[key]):.4f})"
-            for key, mean in (("maps", maps), ("rays", rays))
-        ]
-        print(f"| {scene.name} | {cells[0]} | {cells[1]} | {maps / rays:.2f} | {found['indirect']:.3f} |", flush=True)
+        for graph in arguments.graphs:
+            found = measure(scene, truth, graph=graph, size=arguments.size, vpls=arguments.vpls, seeds=arguments.seeds)
+            maps, rays = np.mean(found["maps"]), np.mean(found["rays"])
+            cells = [scene.name, graph]
+            cells += [
+                f"{mean:.4f} ({min(found[key]):.4f} to {max(found[key]):.4f})"
+                for key, mean in (("maps", maps), ("rays", rays))
+            ]
+            cells += [f"{maps / rays:.2f}", f"{found['indirect']:.3f}"]
+            print(f"| {' | '.join(cells)} |", flush=True)
 
 
 if __name__ == "__main__":

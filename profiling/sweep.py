@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,6 @@ from deferred_ir.flip import FlipParameters
 from deferred_ir.gl.gpu import Gpu
 from deferred_ir.metrics import compare, masked_relmse
 from deferred_ir.options import chosen_settings
-from deferred_ir.path_tracer import Progress
 from deferred_ir.renderer import IMAGES, Renderer
 from deferred_ir.scene import Scene
 from deferred_ir.timing import Record
@@ -24,6 +22,7 @@ from deferred_ir.typing import Array
 
 from . import edges, peer_sweep, points, sweep_reference
 from .edges import Mask
+from .output import bars
 from .peer_points import Peers
 from .points import Key, Point
 from .sweep_reference import Truth
@@ -95,7 +94,7 @@ def run(sweep: Sweep, folder: Path, reference: Path | None) -> tuple[list[Point]
             "graphs": [sweep.key(graph, max(sweep.vpls), 0).graph_hash for graph in sweep.graphs],
             "device": device,
         }
-        with _bars() as bar:
+        with bars() as bar:
             truth = sweep_reference.made(
                 folder,
                 sweep.scene,
@@ -104,7 +103,7 @@ def run(sweep: Sweep, folder: Path, reference: Path | None) -> tuple[list[Point]
                 images=lambda: _probes(sweep),
                 progress=lambda spp: bar(f"reference, {spp} paths"),
             )
-    with _bars() as bar:
+    with bars() as bar:
         mask = edges.made(folder, sweep.scene, sweep.size, progress=lambda: bar("edges"))
     done, ahead = dict[str, Point](), list[tuple[str, int, int]]()
     truth_hash = truth.hash
@@ -210,28 +209,3 @@ def _probes(sweep: Sweep) -> list[Array]:
             renderer.draw(sweep.scene, plan)
             images.append(renderer.read(plan).radiance)
     return images
-
-
-@contextmanager
-def _bars() -> Iterator[Callable[[str], Progress]]:
-    """Progress bars on a terminal, one for each name that is given."""
-    from tqdm import tqdm
-
-    bars: list[Any] = []
-
-    def begin(name: str) -> Progress:
-        for bar in bars:
-            bar.close()
-        bars.append(tqdm(desc=name, disable=not sys.stderr.isatty(), file=sys.stderr))
-
-        def progress(done: int, total: int) -> None:
-            bars[-1].total = total
-            bars[-1].update(done - bars[-1].n)
-
-        return progress
-
-    try:
-        yield begin
-    finally:
-        for bar in bars:
-            bar.close()

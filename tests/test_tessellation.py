@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from importlib import import_module
 
@@ -18,6 +19,7 @@ from deferred_ir.run_record import run_record
 from deferred_ir.subdivision import subdivide
 from deferred_ir.timing import Record
 
+measurement = import_module("deferred_ir.profiling.tessellation")
 visibility = import_module("deferred_ir.profiling.visibility")
 
 PRE = {"shadow_maps.projection": "paraboloid", "shadow_maps.tessellation": "pre"}
@@ -196,3 +198,39 @@ def test_the_mesh_is_told_of_where_there_is_one(renderer, graph, projection):
     points, parts = subdivide(scene.geometry.positions, scene.geometry.faces, 0.1 * scene.geometry.diagonal)
     assert told == {"triangles": len(parts), "bytes": 12 * len(points) + 12 * len(parts)}
     assert one.memory()["buffers"] >= before + told["bytes"]
+
+
+# The measurement
+
+
+def measured(kind, value, ms, mismatch):
+    name = "edge" if kind == "pre" else "bend"
+    figures = {"triangles": 1000, "bytes": 2048 if kind == "pre" else 0, "ms": ms, "mismatch": mismatch, "error": 0.0}
+    return {"scene": "built", "tessellation": kind, name: value, **figures}
+
+
+def test_beside_adaptive_stands_the_fastest_that_is_no_worse():
+    rows = [measured("pre", 0.2, 10.0, 0.02), measured("pre", 0.1, 20.0, 0.0102), measured("pre", 0.05, 80.0, 0.01)]
+    adaptive = [measured("adaptive", 4.0, 15.0, 0.01), measured("adaptive", 1.0, 30.0, 0.005)]
+    assert measurement.equal([*rows, *adaptive]) == [(adaptive[0], rows[1]), (adaptive[1], None)]
+    table = measurement.tables([*rows, *adaptive])
+    assert "| built | pre, edge 0.1 | 1,000 | 2 KiB | 20 | 1.020 +-0.000 |" in table
+    assert "| built | adaptive, bend 4 | 1,000 | 15 | pre, edge 0.1 | 1,000 | 20 |" in table
+    assert "| built | adaptive, bend 1 | 1,000 | 30 | none |  |  |" in table
+
+
+def test_the_measurement_writes_what_it_says(tmp_path, monkeypatch, capsys):
+    small = {"SIZE": (32, 32), "VPLS": 8, "EDGES": (1.0, 0.1), "BENDS": (4.0,)}
+    small["SETTINGS"] = {**measurement.SETTINGS, "vpl.count": 8}
+    for name, value in small.items():
+        monkeypatch.setattr(measurement, name, value)
+    monkeypatch.setattr("sys.argv", ["tessellation", "cornell", "-o", str(tmp_path), "--turns", "1", "--pairs", "100"])
+    measurement.main()
+    assert {file.name for file in tmp_path.iterdir()} == {"tessellation.json", "tessellation.svg"}
+    coarse, fine, adaptive = json.loads((tmp_path / "tessellation.json").read_text())["rows"]
+    assert fine["triangles"] > 20 * coarse["triangles"]
+    assert fine["bytes"] > 20 * coarse["bytes"] > 0
+    assert adaptive["bytes"] == 0
+    assert adaptive["triangles"] > coarse["triangles"]
+    assert coarse["mismatch"] > fine["mismatch"]
+    assert "cornell" in capsys.readouterr().out

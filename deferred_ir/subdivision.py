@@ -25,8 +25,8 @@ def subdivide(positions: Array, faces: Ints, longest: float, most: int = MOST) -
     points, index = np.unique(positions.astype(np.float32), axis=0, return_inverse=True)
     # Middles in double precision: far from the origin, halves of a short edge would meet one of its ends.
     points = points.astype(np.float64)
-    ahead, known = index.reshape(-1)[faces].astype(np.int64), 0
-    done = [ahead[:0]]
+    ahead: Ints = index.reshape(-1)[faces].astype(np.int64)
+    done, known = [ahead[:0]], 0
     while len(ahead):
         long = _lengths(points, ahead) > longest
         split = long.any(axis=1)

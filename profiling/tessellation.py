@@ -76,7 +76,7 @@ def variants() -> list[Row]:
 def costs(scene: Scene, chosen: Sequence[Mapping[str, Any]], turns: int) -> list[Row]:
     """Triangles in all maps, extra bytes, and the pass's median time of `turns` frames, each drawn by turns."""
     with ExitStack() as stack:
-        makes = [Renderer(SIZE, GRAPH, set=SETTINGS | each, passes=PASSES) for each in chosen]
+        makes = [Renderer(SIZE, GRAPH, set={**SETTINGS, **each}, passes=PASSES) for each in chosen]
         renderers = [stack.enter_context(one) for one in makes]
         plans = [one.plan(scene, VPLS) for one in renderers]
         records = [Record() for _ in renderers]
@@ -99,7 +99,7 @@ def costs(scene: Scene, chosen: Sequence[Mapping[str, Any]], turns: int) -> list
 
 def mismatch(scene: Scene, settings: Mapping[str, Any], pairs: int) -> visibility.Share:
     """The share of pairs of a pixel and a VPL of which map and ray disagree."""
-    options = visibility.Options(SIZE, pairs, (MAP_SIZE,), settings=SETTINGS | settings)
+    options = visibility.Options(SIZE, pairs, (MAP_SIZE,), settings={**SETTINGS, **settings})
     return next(row.mismatch for row in visibility.rows(scene, options) if row.lights == "vpls")
 
 

@@ -40,12 +40,16 @@ class Texture:
 
 @dataclass(frozen=True)
 class Buffer:
-    """A buffer of up to `records` records of `format`, `stride` bytes each, allocated in blocks of `block` records."""
+    """A buffer of up to `records` records of `format`, `stride` bytes each, allocated in blocks of `block` records.
+
+    parts: how many nearly equal parts its records are dealt into, one after the other.
+    """
 
     format: str
     records: int
     stride: int
     block: int = 1
+    parts: int = 1
 
     def __str__(self) -> str:
         return f"{self.records} {self.format}"
@@ -91,6 +95,15 @@ class Facts:
 
     clamped: bool = True
     """VPLs light what is near them with less than they should."""
+
+    triangles: int = 0
+    pixels: int = 512 * 512
+
+    shares: int = 1
+    """A pixel is lit by one in so many VPLs."""
+
+    software: bool = True
+    """OpenGL draws on the CPU."""
 
 
 class Pass:

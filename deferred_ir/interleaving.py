@@ -31,6 +31,14 @@ def sub_buffers(size: tuple[int, int], n: int) -> list[tuple[int, int, int, int]
     return [(x, y, width, height) for y, height in rows for x, width in columns]
 
 
+def places(pixel: Ints, size: tuple[int, int], n: int) -> tuple[Ints, Ints]:
+    """The shares of pixels (m,), numbered row by row, and where they stand in the texture of sub-buffers, int (m,)."""
+    width, height = size
+    y, x = np.divmod(pixel, width)
+    columns, rows = (np.array([start for start, _ in _parts(length, n)]) for length in (width, height))
+    return y % n * n + x % n, (rows[y % n] + y // n) * width + columns[x % n] + x // n
+
+
 def _parts(length: int, n: int) -> list[tuple[int, int]]:
     """Start and length of the part that holds every n-th of `length` pixels, for each of the n offsets."""
     whole, rest = divmod(length, n)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Container, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from numbers import Integral
 from pathlib import Path
 from types import TracebackType
@@ -79,7 +80,8 @@ class Renderer:
         """What a frame of `scene` runs; `outputs` are all that the graph has unless some are named."""
         if not isinstance(scene, Scene):
             raise SettingError(f"scene: is {type(scene).__name__}, not a Scene; load it first: deferred_ir.load(...)")
-        graph, known = self.graph(vpls), scene.facts
+        graph = self.graph(vpls)
+        known = replace(scene.facts, pixels=self.size[0] * self.size[1], software=self.gpu.device.kind == "software")
         wanted = tuple(graph.outputs if outputs is None else outputs)
         key = (vpls, known, wanted)
         if key not in self._plans:

@@ -144,7 +144,7 @@ class Scene:
     @property
     def facts(self) -> Facts:
         """What planning a frame may know of the scene."""
-        return Facts(emits=any(self.spotlight.emission))
+        return Facts(emits=any(self.spotlight.emission), triangles=len(self.geometry.faces))
 
     def at(self, time: float) -> Scene:
         """The scene with camera and spotlight at `time` seconds; SceneError if one of them meets what it looks at."""

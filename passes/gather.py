@@ -43,6 +43,8 @@ class Gather(Pass):
         "shares": Input("irradiance in sub-buffers", format="rgba32f"),
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
+        "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
+        "rays": Input("which VPLs are seen: then they have no maps, and thin things are left", "r32ui", optional=True),
         "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
     }
 
@@ -68,6 +70,9 @@ class Gather(Pass):
             cosine_squared=cos(angle) ** 2, sine_squared=sin(angle / 2) ** 2, fewest=self.params.fewest * shares
         )
         program.draw_fullscreen()
+        if io["rays"]:
+            gpu.barrier()
+            return
         program = io.program("thin.frag", "thin.vert")
         gpu.gl.ColorMask(0, 0, 0, 0)  # the shader stores where each pixel belongs
         for start in range(0, len(vpls.records), vpls.description.block):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from deferred_ir.errors import GraphError
@@ -33,12 +33,16 @@ class Interleave(Pass):
         assert isinstance(lights, Buffer)
         if n & (n - 1):
             raise GraphError(f"n {n}: wants 1, 2, 4 or 8")
-        vpls = Buffer("share", lights.records, lights.stride, lights.block)
+        vpls = Buffer("share", lights.records, lights.stride, lights.block, parts=n * n)
         return {
             "vpls": Output(
                 "the VPLs in the order of their shares", vpls, {"INTERLEAVE": n, "LIGHTS_PER_BLOCK": lights.block}
             )
         }
+
+    def informed(self, facts: Facts) -> Facts:
+        """How the VPLs are dealt."""
+        return replace(facts, shares=self.params.n**2)
 
     def unneeded(self, facts: Facts) -> str | None:
         """With one share there is nothing to deal."""

@@ -22,6 +22,8 @@ class Interleaved(Pass):
         "vpls": Input("the VPLs in the order of their shares", format="share"),
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
+        "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
+        "rays": Input("which VPLs are seen, instead of maps", format="r32ui", optional=True),
         "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
     }
 
@@ -47,6 +49,8 @@ class Interleaved(Pass):
                 vpls.bind_uniform(1, number)
                 first, end = max(start - number * block, 0), min(stop - number * block, block)
                 program.set(share=(share % n, share // n), begins=first + number * block == start, first=first, end=end)
+                if io["rays"]:
+                    program.set(before=number * block - start)
                 program.draw_fullscreen()
 
 

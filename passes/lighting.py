@@ -25,6 +25,7 @@ class Lighting(Pass):
         "albedo": Input("reflectance", format="rgba16f"),
         "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
         "indirect": Input("irradiance from the VPLs, instead of adding them up", format="rgba32f", optional=True),
+        "thin": Input("irradiance where the filter has left it out", format="rgba32f", optional=True),
         "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
         "blockers": Input("the same maps: what hides a part of the spotlight's disc", format="depth32f", optional=True),
     }

@@ -23,7 +23,10 @@ class ShadowMaps(Pass):
     """Depth as each light sees it."""
 
     Params = MapParams
-    inputs: ClassVar[Mapping[str, Input]] = {"lights": Input("the lights to draw maps for", format="light")}
+    inputs: ClassVar[Mapping[str, Input]] = {
+        "lights": Input("the lights to draw maps for", format="light"),
+        "rays": Input("which VPLs are seen, by rays: then only the spotlight gets a map", "r32ui", optional=True),
+    }
 
     def _tiles_per_layer(self) -> int:
         row: int = self._edge() // self.params.vpl_size
@@ -65,10 +68,10 @@ class ShadowMaps(Pass):
         self.params.prepare(gpu)
         geometry = [] if gpu.layer_from_vertex else ["shadow_maps.geom"]
         program = io.program("depth.frag", "shadow_maps.vert", *geometry)
-        total = len(lights.records)
+        total = 1 if io["rays"] else len(lights.records)
         for start in range(0, total, LIGHTS_PER_BLOCK):
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
-            records = lights.records[start : start + LIGHTS_PER_BLOCK]
+            records = lights.records[start : min(start + LIGHTS_PER_BLOCK, total)]
             curved = self.params.paraboloid(records)
             for mesh, drawn in map_meshes.shares(frame, self.params, records):
                 if (drawn & ~curved).any():
@@ -82,9 +85,9 @@ class ShadowMaps(Pass):
 
 
 def _lights(inputs: Mapping[str, Description | None]) -> int:
-    """How many lights the buffer can hold."""
+    """How many lights may get a map."""
     lights = inputs["lights"]
-    return lights.records if isinstance(lights, Buffer) else 1
+    return lights.records if isinstance(lights, Buffer) and not inputs["rays"] else 1
 
 
 PASS = ShadowMaps

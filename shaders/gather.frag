@@ -7,6 +7,9 @@
 layout(binding = UNIT_SHARES) uniform sampler2D shares;
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
+#if HAS_NEAR_FIELD
+layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
+#endif
 uniform float cosine_squared;  // of the largest angle between normals, at most 90 degrees
 uniform float sine_squared;    // of the largest angle off the pixel's plane
 uniform float fewest;          // neighbours
@@ -58,7 +61,19 @@ void main() {
     vec4 sum = vec4(0.0);
     for (int y = 0; y < N; ++y)
         for (int x = 0; x < N; ++x) sum += neighbour(c, corner + ivec2(x, y));
-    if (sum.a <= fewest) {
+    bool lonely = sum.a <= fewest;
+#if HAS_NEAR_FIELD
+    // What the clamp took is missing there, too, and what neighbours have of it is less noisy than the pixel's own.
+    vec4 given = vec4(0.0);
+    int alone = lonely ? N : 0;
+    for (int y = 0; y < alone; ++y)
+        for (int x = 0; x < N; ++x) {
+            ivec2 other = corner + ivec2(x, y);
+            given += texelFetch(near_field, other, 0) * neighbour(c, other).a;
+        }
+    irradiance.rgb = given.rgb / max(given.a, 1e-3);
+#endif
+    if (lonely) {
         uint number = imageAtomicAdd(count, ivec2(0), 1u);
         imageStore(thin, thin_place(number, c.size.x), uvec4(c.pixel.y * c.size.x + c.pixel.x));
         return;

@@ -4,6 +4,15 @@
 #include "lib/light.glsl"
 #include "lib/visibility.glsl"
 #include "lib/interleave.glsl"
+#if HAS_RAYS
+#include "lib/rays.glsl"
+#define VISIBILITY(i) ray_visibility(before + i)
+#else
+#define VISIBILITY(i) VPL_VISIBILITY(lights[i])
+#endif
+#if HAS_NEAR_FIELD
+layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
+#endif
 
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
@@ -11,6 +20,7 @@ uniform ivec2 share;
 uniform bool begins;  // the first of a share's draws, which later ones are added to
 uniform int first;
 uniform int end;
+uniform int before;  // of VPLs of its share before this block; below 0 where the block begins with those of others
 
 layout(location = 0) out vec4 irradiance;  // alpha: the shading normal, for the filter
 
@@ -27,6 +37,10 @@ void main() {
     vec3 shading_normal = from_octahedral(code.xy), normal = from_octahedral(code.zw);
     vec3 sum = vec3(0.0);
     for (int i = first; i < end; ++i)
-        sum += vpl_irradiance(lights[i], position, normal, shading_normal) * VPL_VISIBILITY(lights[i]);
-    irradiance = vec4(sum * float(INTERLEAVE * INTERLEAVE), begins ? pack_normal(code.xy) : 0.0);
+        sum += vpl_irradiance(lights[i], position, normal, shading_normal) * VISIBILITY(i);
+    sum *= float(INTERLEAVE * INTERLEAVE);
+#if HAS_NEAR_FIELD
+    if (begins) sum += texelFetch(near_field, pixel, 0).rgb;  // to be filtered with the rest
+#endif
+    irradiance = vec4(sum, begins ? pack_normal(code.xy) : 0.0);
 }

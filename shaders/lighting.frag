@@ -9,6 +9,9 @@ layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 layout(binding = UNIT_ALBEDO) uniform sampler2D albedo;
 #if HAS_INDIRECT
 layout(binding = UNIT_INDIRECT) uniform sampler2D indirect;
+#if HAS_THIN
+layout(binding = UNIT_THIN) uniform sampler2D thin;
+#endif
 #elif HAS_NEAR_FIELD
 layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
 #endif
@@ -34,6 +37,9 @@ void main() {
                    * SPOT_VISIBILITY(lights[0]);
 #if HAS_INDIRECT  // with the near field in it
     irradiance += texelFetch(indirect, pixel, 0).rgb;
+#if HAS_THIN
+    irradiance += texelFetch(thin, pixel, 0).rgb;
+#endif
 #elif HAS_NEAR_FIELD
     if (first == 1) irradiance += texelFetch(near_field, pixel, 0).rgb;
 #endif

@@ -41,6 +41,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "TexStorage2D": (None, _U, _I, _U, _I, _I),
     "TexStorage3D": (None, _U, _I, _U, _I, _I, _I),
     "TexSubImage2D": (None, _U, _I, _I, _I, _I, _I, _U, _U, _P),
+    "TexSubImage3D": (None, _U, _I, _I, _I, _I, _I, _I, _I, _U, _U, _P),
     "Viewport": (None, _I, _I, _I, _I),
 }
 

@@ -67,13 +67,15 @@ class GpuTexture:
             raise
 
     def upload(self, pixels: Any) -> None:
-        """Fill a 2D texture from (H, W, channels) rows, bottom row first, in the format's dtype."""
+        """Fill it from (H, W, channels) or (layers, H, W, channels), bottom row first, in the format's dtype."""
         gl, data = self.gpu.gl, np.ascontiguousarray(pixels, self.format.dtype)
         gl.BindTexture(self.target, self.glo)
         gl.PixelStorei(0x0CF5, 1)  # UNPACK_ALIGNMENT
-        gl.TexSubImage2D(
-            self.target, 0, 0, 0, *self.size, self.format.layout, self.format.type, data.ctypes.data_as(ctypes.c_void_p)
-        )
+        source = self.format.layout, self.format.type, data.ctypes.data_as(ctypes.c_void_p)
+        if self.description.layers:
+            gl.TexSubImage3D(self.target, 0, 0, 0, 0, *self.size, self.description.layers, *source)
+        else:
+            gl.TexSubImage2D(self.target, 0, 0, 0, *self.size, *source)
 
     def bind(self, unit: int, sampler: Any) -> None:
         """Make it readable through texture `unit` with a moderngl sampler."""

@@ -34,7 +34,7 @@ class Interleaved(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """A draw for each share, or more where it crosses from block to block of the buffer."""
-        vpls, n = io["vpls"], io.defines["INTERLEAVE"]
+        vpls, n = io["vpls"], int(io.defines["INTERLEAVE"])
         ctx, block = io.gpu.ctx, vpls.description.block
         program = io.program("interleaved.frag")
         io.framebuffer.clear_color()

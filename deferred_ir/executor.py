@@ -116,7 +116,7 @@ class Executor:
         if max(width_height) > self.gpu.max_size:
             raise DeviceError(
                 f"{width_height[0]}x{width_height[1]} pixels, and this driver draws at most {self.gpu.max_size}; "
-                "use a smaller size"
+                f"use {description.mend}"
             )
         if description.copies:
             made: list[GpuTexture] = []

@@ -24,13 +24,15 @@ from .params import NoParams
 class Texture:
     """A texture: `size` (width, height), None for the frame's; `layers` > 0 makes it an array.
 
-    `copies` > 0 makes that many separate textures, which the pass itself attaches and binds one by one.
+    `copies` > 0 makes that many separate textures, which the pass itself attaches and binds one by one. `mend` says
+    what to use where a driver takes none as large.
     """
 
     format: str
     size: tuple[int, int] | None = None
     layers: int = 0
     copies: int = 0
+    mend: str = field(default="a smaller size", compare=False)
 
     def __str__(self) -> str:
         size = "frame" if self.size is None else f"{self.size[0]}x{self.size[1]}"

@@ -16,6 +16,9 @@ WIDEST_PLANAR = 140.0
 """A spotlight wider than this, in degrees, gets a paraboloid map: the planar one has few texels for its middle."""
 WIDE = one_minus_cos(WIDEST_PLANAR)
 
+MOST_LAYERS = 2048
+"""Of an array texture: what every driver of OpenGL 4.3 takes."""
+
 LEAST_REACH = 2.0
 """In paraboloid maps triangles nearer than this, in lengths of their edges, are split, however small the map is."""
 
@@ -45,7 +48,7 @@ class MapParams:
         "perspective", doc="Of the VPLs' maps. The spotlight's is a paraboloid where it is wider than 140 degrees."
     )
     bend: float = param(
-        4.0, lo=0.1, hi=16.0, doc="Paraboloid maps: edges that may be off by more texels than this are split."
+        2.0, lo=0.1, hi=16.0, doc="Paraboloid maps: edges that may be off by more texels than this are split."
     )
     tessellation: Literal["adaptive", "pre"] = param(
         "adaptive",
@@ -70,6 +73,15 @@ class MapParams:
                 f"maps for {vpls} VPLs of {self.vpl_size}x{self.vpl_size} need {nbytes // 2**20} MiB, and "
                 f"shadow_maps.budget is {self.budget}; {max(fits, 0)} VPLs fit, all bounces together; "
                 "use fewer, a smaller shadow_maps.vpl_size or a larger budget"
+            )
+
+    def check_layers(self, vpls: int, layers: int, tiles: int) -> None:
+        """Raise GraphError if an atlas has too many layers; VPLs have `tiles` on each but the first."""
+        if layers > MOST_LAYERS:
+            raise GraphError(
+                f"maps for {vpls} VPLs of {self.vpl_size}x{self.vpl_size} need {layers} layers, and there are "
+                f"{MOST_LAYERS}; {(MOST_LAYERS - 1) * tiles} VPLs fit, all bounces together; "
+                "use fewer, a smaller shadow_maps.vpl_size or a larger shadow_maps.spot_size"
             )
 
     def defines(self) -> dict[str, int | float]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from .gl.cluster_buffers import ClusterBuffers
 from .io import Io
-from .maps import MapParams
+from .maps import LEAST_REACH, MapParams
 from .typing import Bools
 
 FILES = ("paraboloid.frag", "paraboloid.vert")
@@ -32,7 +32,8 @@ def draw(mesh: ClusterBuffers, io: Io, params: MapParams, records: np.ndarray, c
     for split, share in ((False, visible & ~bent), (True, visible & bent)):
         if share.any():
             files = [*FILES, *(SPLIT if split else ()), *geometry]
-            defines = {"SPLIT": int(split), "STRAIGHT": int(straight), "BEND": float(params.bend)}
+            defines: dict[str, int | float] = {"SPLIT": int(split), "STRAIGHT": int(straight)}
+            defines |= {"BEND": float(params.bend), "LEAST_REACH": LEAST_REACH}
             program = io.program(*files, defines=defines)
             mesh.draw(program, share, patches=split)
     gpu.clip(0)

@@ -30,8 +30,10 @@ class PlainMaps(Pass):
         count = lights.records if isinstance(lights, Buffer) else 1
         single, room = 4 * p.vpl_size**2, p.budget * 2**20 - 4 * p.spot_size**2
         p.check_budget(count - 1, 4 * p.spot_size**2 + (count - 1) * single, room // single)
-        spot = Texture("depth32f", size=(p.spot_size, p.spot_size), copies=1)
-        vpls = Texture("depth32f", size=(p.vpl_size, p.vpl_size), copies=max(count - 1, 1))
+        spot = Texture("depth32f", size=(p.spot_size, p.spot_size), copies=1, mend="a smaller shadow_maps.spot_size")
+        vpls = Texture(
+            "depth32f", (p.vpl_size, p.vpl_size), copies=max(count - 1, 1), mend="a smaller shadow_maps.vpl_size"
+        )
         return {
             "spot": Output("reversed depth from the spotlight", spot, p.defines()),
             "vpls": Output("reversed depth from each VPL", vpls, p.defines()),

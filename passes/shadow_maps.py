@@ -42,8 +42,10 @@ class ShadowMaps(Pass):
         layers = 1 + -(-vpls // per_layer)
         layer = 4 * edge * edge
         self.params.check_budget(vpls, layers * layer, (self.params.budget * 2**20 // layer - 1) * per_layer)
+        self.params.check_layers(vpls, layers, per_layer)
         defines = {**self.params.defines(), "ATLAS_SIZE": edge}
-        atlas = Texture("depth32f", size=(edge, edge), layers=layers)
+        larger = "spot_size" if edge == self.params.spot_size else "vpl_size"
+        atlas = Texture("depth32f", size=(edge, edge), layers=layers, mend=f"a smaller shadow_maps.{larger}")
         return {"atlas": Output("reversed depth; layer 0 the spotlight's, then tiles of VPLs", atlas, defines)}
 
     def unneeded(self, facts: Facts) -> str | None:

@@ -16,13 +16,13 @@ vec3 seen_direction(Light light) {
 #endif
 
 #if SPLIT
-const float GAP = 0.01;  // texels over the edge, lest rounding opens a gap to the neighbour
-
 void main() {
     Light light = lights[part.light];
     vec3 direction = seen_direction(light);
     float depth = max(dot(part.plane.xyz, direction), part.plane.w);
-    bool outside = any(lessThan(direction * part.edges, vec3(-GAP * texel_angle(light))));
+    vec2 p = part.ndc * light.curve * light.tan_half;
+    vec3 inside = max(direction * part.edges, vec3(p, 1.0) * part.chords);
+    bool outside = any(lessThan(inside, vec3(-part.gap)));
     if (outside || direction.z <= depth) discard;  // or closer than the near plane
     gl_FragDepth = depth;
 }

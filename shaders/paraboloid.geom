@@ -26,7 +26,9 @@ void main() {
         part.ndc = corner[i].ndc;
         part.light = corner[i].light;
         part.edges = corner[i].edges;
+        part.chords = corner[i].chords;
         part.plane = corner[i].plane;
+        part.gap = corner[i].gap;
 #elif STRAIGHT
         part.ndc = corner[i].ndc;
         part.light = corner[i].light;

@@ -2,6 +2,7 @@
 // be nearly straight in the light's paraboloid map. The outline moves out by as much as it may still bend (paraboloid.tese),
 // so that the parts cover all of the triangle; paraboloid.frag discards what they cover beyond it.
 #include "lib/shadow.glsl"
+#include "lib/part.glsl"
 
 layout(vertices = 1) out;
 
@@ -12,13 +13,20 @@ patch out vec3 corners[4];  // unit, from the light to what is left of the trian
 patch out vec4 inwards[4];  // normals of the planes through the light and the edge to the next corner; angles of the edges
 patch out float turn;       // 1 if the corners go round their normals' way, else -1
 patch out float margin;     // how far to move the outline, an angle
-patch out mat3 edges;       // planes through the light and an edge; a direction within the triangle is on their inner sides
-patch out vec4 plane;       // xyz: depth is its dot product with the direction in the light's frame; w: the least depth
+patch out mat3 edges;       // these four as in lib/part.glsl
+patch out mat3 chords;
+patch out vec4 plane;
+patch out float gap;
 
-const float HIGHEST = 64.0;   // OpenGL promises so many parts
-const float ROUNDING = 1e-3;  // of the near plane's distance: positions of the scene are no better known
-const float WIDEST = 0.05;    // margin: so far behind the light's plane directions still have a place in the map
-const float EDGE_ON = 1e-4;   // sine: no closer to the light's own plane can a surface be told from it
+const float HIGHEST = 64.0;    // OpenGL promises so many parts
+const float ROUNDING = 1e-3;   // of the near plane's distance: positions of the scene are no better known
+const float WIDEST = 0.05;     // margin: so far behind the light's plane directions still have a place in the map
+const float EDGE_ON = 1e-4;    // sine: no closer to the light's own plane can a surface be told from it
+const float PART_BEND = 4.0;   // texels that a part's side may bend
+const float SHARP_BEND = 1.0;  // the same beside a sharp corner
+const float UNDIVIDED = 0.02;  // texels: a side that bends by less is not divided
+const float GAP = 0.01;        // texels over the sides, lest rounding opens a gap to the neighbour
+const float NARROW = 0.05;     // texels: of a triangle no wider than this roundings choose the plane
 
 vec3 unit(vec3 v) {
     return v * inversesqrt(max(dot(v, v), TINY));
@@ -46,6 +54,30 @@ float bend(Light light, vec4 inward) {
     return inward.w * inward.w * abs(dot(inward.xyz, light.z_axis)) / 4.0;
 }
 
+// Square of the angle, nearly, of the longest side that is straight in the map, as all are of triangles that are drawn
+// whole (MapParams.reach): neighbours that share a side leave no gap, whichever way each is drawn.
+float straight_side(float texel) {
+    return 1.01 * min(4.0 * BEND * texel, 1.0 / (LEAST_REACH * LEAST_REACH));
+}
+
+// Whether paraboloid.tese moves a corner by less than the margin.
+bool is_sharp(vec3 before, vec3 behind) {
+    return 1.0 + dot(before, behind) < BLUNT;
+}
+
+// What gives 1 / distance of the line through a and b by a dot product with a unit direction, the same across the line.
+vec3 plane_along(vec3 a, vec3 b) {
+    vec3 way = b - a, foot = a - way * (dot(a, way) / max(dot(way, way), TINY));
+    return foot / max(dot(foot, foot), TINY);
+}
+
+// The line of the map through start and end, unit directions in the light's frame: see lib/part.glsl.
+vec3 line(vec3 start, vec3 end) {
+    vec2 from = start.xy / (1.0 + start.z), way = end.xy / (1.0 + end.z) - from;
+    vec2 left = vec2(-way.y, way.x) * (turn * inversesqrt(max(dot(way, way), TINY)));
+    return vec3(left, -dot(left, from));
+}
+
 void main() {
     Light light = lights[light_of_corner[0]];
     light_of_patch = light_of_corner[0];
@@ -62,8 +94,24 @@ void main() {
     }
     mat3 to_frame = transpose(mat3(light.x_axis * light.tan_half, light.y_axis * light.tan_half, light.z_axis));
     turn = h < 0.0 ? -1.0 : 1.0;
-    edges = to_frame * mat3(across(a, b), across(b, c), across(c, a)) * turn;
-    plane = vec4(to_frame * normal * (frame.near / h), frame.near / max(max(sizes.x, max(sizes.y, sizes.z)), TINY));
+    float texel = texel_angle(light), longest = 0.0;
+    vec3 depths = normal / h, triangle[3] = vec3[3](a, b, c), units[3] = vec3[3](unit(a), unit(b), unit(c));
+    float longest_straight = straight_side(texel);
+    for (int i = 0; i < 3; ++i) {
+        int next = (i + 1) % 3;
+        vec3 side = across(triangle[i], triangle[next]), way = units[next] - units[i];
+        float square = dot(way, way);
+        edges[i] = to_frame * side * turn;
+        bool beyond = edges[i].z < 0.0 && square <= longest_straight && max(along[i], along[next]) > 0.0;
+        chords[i] = beyond ? line(to_frame * units[i], to_frame * units[next]) : vec3(0.0, 0.0, -1.0);
+        if (square > longest) {
+            longest = square;
+            bool narrow = abs(dot(side, units[(i + 2) % 3])) < NARROW * texel;
+            depths = narrow ? plane_along(triangle[i], triangle[next]) : normal / h;
+            gap = narrow ? 0.0 : GAP * texel;  // else a needle would be as wide
+        }
+    }
+    plane = frame.near * vec4(to_frame * depths, 1.0 / max(max(sizes.x, max(sizes.y, sizes.z)), TINY));
 
     // Turned so that the corners in front of the light come first: all, two or one.
     for (int turned = 0; turned < 2; ++turned) {
@@ -81,16 +129,27 @@ void main() {
         if (along.y <= 0.0) b = cut(a, b, along.x, along.y);
     }
     vec3 left[4] = vec3[4](unit(a), unit(b), unit(c), unit(d));
-    float texel = texel_angle(light), tolerated = min(BEND * texel, WIDEST);
-    margin = 0.0;
     for (int i = 0; i < 4; ++i) {
         vec3 start = left[i], end = left[(i + 1) % 4];
         corners[i] = start;
-        vec4 inward = vec4(across(start, end) * turn, atan(length(cross(start, end)), dot(start, end)));
-        inwards[i] = inward;
-        float most = bend(light, inward), count = clamp(ceil(sqrt(most / tolerated)), 1.0, HIGHEST);
-        margin = max(margin, most / (count * count));
-        gl_TessLevelOuter[(i + 1) % 4] = count;
+        inwards[i] = vec4(across(start, end) * turn, atan(length(cross(start, end)), dot(start, end)));
+    }
+    bool is_cut = along.z <= 0.0;
+    margin = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        int next = (i + 1) % 4;
+        vec3 inward = inwards[i].xyz, way = left[next] - left[i];
+        bool sharp = is_sharp(inwards[(i + 3) % 4].xyz, inward) || is_sharp(inward, inwards[next].xyz);
+        float most = bend(light, inwards[i]), count = 1.0;
+        if (dot(inward, light.z_axis) < 0.0 && dot(way, way) <= longest_straight) {
+            if (is_cut) margin = max(margin, most);
+        } else {
+            // Beside a sharp corner, which moves less than the margin, the outline has to be the farther off.
+            float tolerated = min((sharp ? SHARP_BEND : PART_BEND) * texel, WIDEST);
+            count = clamp(ceil(sqrt(most / tolerated)), sharp && most > UNDIVIDED * texel ? 2.0 : 1.0, HIGHEST);
+            margin = max(margin, (sharp ? 4.0 : 1.0) * most / (count * count));
+        }
+        gl_TessLevelOuter[next] = count;
     }
     margin += 0.1 * texel;
     gl_TessLevelInner[0] = gl_TessLevelInner[1] = 1.0;  // the parts cover what their outline encloses, however they fold

@@ -12,7 +12,9 @@ patch in vec4 inwards[4];
 patch in float turn;
 patch in float margin;
 patch in mat3 edges;
+patch in mat3 chords;
 patch in vec4 plane;
+patch in float gap;
 
 // The direction that divides the edge from corner i to the next by angle, moved out.
 vec3 on_edge(int i, float t) {
@@ -24,7 +26,7 @@ vec3 on_edge(int i, float t) {
 // Both edges are moved by `margin`; a needle's tip is not drawn out for ever.
 vec3 at_corner(int i) {
     vec3 before = inwards[(i + 3) % 4].xyz, behind = inwards[i].xyz;
-    return corners[i] - (before + behind) * (margin / max(1.0 + dot(before, behind), 0.2));
+    return corners[i] - (before + behind) * (margin / max(1.0 + dot(before, behind), BLUNT));
 }
 
 void main() {
@@ -37,6 +39,8 @@ void main() {
     else direction = corners[0] + corners[1] + corners[2] + corners[3];
     part.light = light_of_patch;
     part.edges = edges;
+    part.chords = chords;
     part.plane = plane;
+    part.gap = gap;
     part.ndc = place(lights[light_of_patch], direction);
 }

@@ -10,22 +10,27 @@ from .typing import Array, Bools, Ints
 
 CLUSTER = 64
 """Most triangles in a cluster."""
+OCTAVES = 10
+"""Triangles share a cluster whose longest edges are in one octave, down to 2^-OCTAVES of the longest of all."""
 ROUNDING = 2.0**-18
 """Slack of the test against a plane, relative to the terms it adds: 64 roundings, this test's and the shader's."""
 
 
 class Clusters:
-    """Faces (F, 3) of `positions` (V, 3), grouped by where they are.
+    """Faces (F, 3) of `positions` (V, 3), grouped by where they are, and by `groups` (F,) if these are given.
 
     order: int (F,), the faces of cluster 0, then of cluster 1, ... starts: int (C + 1,), where in `order` each begins.
     """
 
-    def __init__(self, positions: Array, faces: Ints, most: int = CLUSTER) -> None:
+    def __init__(self, positions: Array, faces: Ints, most: int = CLUSTER, groups: Ints | None = None) -> None:
         corners = positions.astype(np.float32)[faces]
         low, high = corners.min(axis=1), corners.max(axis=1)
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         # Triangles of like size together: one large triangle would make its cluster bend in more maps than its own.
-        self.order, self.starts = _split(low / 2 + high / 2, _octaves(edges), most)
+        classes = _octaves(edges)
+        if groups is not None:
+            classes += groups * (OCTAVES + 1)
+        self.order, self.starts = split(low / 2 + high / 2, classes, most)
         first = self.starts[:-1]
         low, high = np.minimum.reduceat(low[self.order], first), np.maximum.reduceat(high[self.order], first)
         centre = low / 2 + high / 2
@@ -62,6 +67,10 @@ class Clusters:
             outside |= np.column_stack([normal, np.abs(normal), offset]) @ self._boxes < 0
         return ~outside
 
+    def drawn(self, lights: np.ndarray) -> Bools:
+        """Which clusters make up the scene for each of `lights`, LIGHT records (n,), culled or not: bool (n, C)."""
+        return np.ones((len(lights), len(self)), bool)
+
     def bent(self, lights: np.ndarray, reach: Array) -> Bools:
         """Which clusters have an edge that may be closer to a light than `reach` (n,) times its length: bool (n, C)."""
         centre, half = self._boxes[:3], self._boxes[3:6]
@@ -71,13 +80,14 @@ class Clusters:
 
 
 def _octaves(edges: Array) -> Ints:
-    """Class of each triangle by its longest edge (F,): halves of the longest of all, down to 1/1024."""
+    """Class of each triangle by its longest edge (F,): halves of the longest of all, down to 2^-OCTAVES."""
     longest = edges.max()
-    classes: Ints = np.ceil(np.log2(np.maximum(edges / longest if longest > 0 else edges, 2.0**-10))).astype(np.intp)
+    shares = edges / longest if longest > 0 else edges
+    classes: Ints = np.ceil(np.log2(np.maximum(shares, 2.0**-OCTAVES))).astype(np.intp)
     return classes
 
 
-def _split(points: Array, classes: Ints, most: int) -> tuple[Ints, Ints]:
+def split(points: Array, classes: Ints, most: int) -> tuple[Ints, Ints]:
     """Halve the `points` (n, 3) of each class across their longest extent until no part has more than `most`.
 
     Returns order (n,) and starts.

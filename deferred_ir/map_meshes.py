@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from . import detail
+from .clusters import Clusters
 from .frame import Frame
 from .gl.cluster_buffers import ClusterBuffers
 from .io import Io
@@ -14,14 +16,24 @@ from .typing import Array, Bools, Ints
 
 def of_vpls(frame: Frame, params: MapParams) -> ClusterBuffers:
     """What the maps of VPLs draw."""
-    if params.projection != "paraboloid" or params.tessellation != "pre":
-        return frame.buffers.cluster_buffers
-    geometry = frame.scene.geometry
+    buffers, geometry = frame.buffers, frame.scene.geometry
+    if params.projection == "paraboloid" and params.tessellation == "pre":
 
-    def make() -> tuple[Array, Ints]:
-        return subdivide(geometry.positions, geometry.faces, params.edge * geometry.diagonal)
+        def split() -> tuple[Array, Ints]:
+            return subdivide(geometry.positions, geometry.faces, params.edge * geometry.diagonal)
 
-    return frame.buffers.stand_in(("edge", params.edge), make)
+        return buffers.stand_in(("edge", params.edge), split)
+    if params.vpl_deviation > 0:
+
+        def simplified() -> tuple[Array, Ints]:
+            return geometry.positions, detail.levels(geometry).faces
+
+        def cluster(positions: Array, _: Ints) -> Clusters:
+            return detail.DetailClusters(positions, detail.levels(geometry), params.tolerance)
+
+        key = ("detail", params.vpl_deviation, params.vpl_size, params.projection)
+        return buffers.stand_in(key, simplified, cluster)
+    return buffers.cluster_buffers
 
 
 def shares(frame: Frame, params: MapParams, records: np.ndarray) -> list[tuple[ClusterBuffers, Bools]]:

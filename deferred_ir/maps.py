@@ -55,13 +55,27 @@ class MapParams:
         doc="Paraboloid maps of VPLs: split in each map what bends there, or draw a mesh without long edges straight.",
     )
     edge: float = param(0.05, lo=1e-4, hi=1.0, doc="Longest edge of that mesh, as a fraction of the scene's diagonal.")
+    vpl_deviation: float = param(
+        0.0,
+        lo=0.0,
+        hi=16.0,
+        doc="VPLs' maps draw a scene that is off by no more than this, texels in the middle of the map. 0: the scene.",
+    )
     cull: Literal["none", "front"] = param(
         "none", doc="front: draw back faces only, which moves the bias to the dark side; for closed meshes."
     )
     budget: int = param(1280, lo=1, hi=65536, doc="Most memory that the maps may take, MiB.")
 
     def check_budget(self, vpls: int, nbytes: int, fits: int) -> None:
-        """Raise GraphError if maps for `vpls` VPLs, `nbytes` in all, go beyond the budget; `fits` VPLs would not."""
+        """Raise GraphError if maps for `vpls` VPLs, `nbytes` in all, go beyond the budget; `fits` VPLs would not.
+
+        And if parameters contradict each other.
+        """
+        if self.vpl_deviation > 0 and self.projection == "paraboloid" and self.tessellation == "pre":
+            raise GraphError(
+                "shadow_maps.vpl_deviation and shadow_maps.tessellation = 'pre' each draw a mesh of their own; "
+                "set vpl_deviation = 0 or tessellation = 'adaptive'"
+            )
         if nbytes > self.budget * 2**20:
             if 4 * self.spot_size**2 > self.budget * 2**20:
                 raise GraphError(
@@ -107,6 +121,15 @@ class MapParams:
         chosen: Bools = (records["tile"] >= 0) & (self.projection == "paraboloid")
         chosen |= (records["tile"] < 0) & (records["one_minus_cos"] > WIDE)
         return chosen
+
+    def tolerance(self, records: np.ndarray) -> Array:
+        """`vpl_deviation` in lengths of the way from each VPL, LIGHT records (n,): (n,).
+
+        A texel is widest in the middle of a map.
+        """
+        widest = 4 * records["curve"] if self.projection == "paraboloid" else 2
+        tolerance: Array = self.vpl_deviation * widest * records["tan_half"] / self.vpl_size
+        return tolerance
 
     def reach(self, records: np.ndarray) -> Array:
         """How many of its lengths an edge must be away from a light to bend by less than `bend` texels, (n,).

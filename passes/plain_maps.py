@@ -64,7 +64,10 @@ class PlainMaps(Pass):
                 paraboloid_maps.draw(mesh, io, self.params, records, only, layered=False)
             else:
                 program.set(light_number=number)
-                (frame.buffers.draw if mesh is own else mesh.draw_all)(program)
+                if mesh is own:
+                    frame.buffers.draw(program)
+                else:
+                    mesh.draw_all(program, io["lights"].records[i : i + 1])
         io.count("maps_drawn", total)
         if total > 1:
             map_meshes.count(frame, io, self.params)

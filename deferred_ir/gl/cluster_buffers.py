@@ -41,9 +41,12 @@ class ClusterBuffers:
         size: int = self._positions.size + self._indices.size
         return size
 
-    def draw_all(self, program: Program) -> None:
-        """Draw all triangles once. The program reads `position` alone."""
-        self._array(program).render(self.gpu.ctx.TRIANGLES)
+    def draw_all(self, program: Program, light: np.ndarray) -> None:
+        """Draw all that makes up the scene for one light, LIGHT records (1,). The program reads `position` alone."""
+        commands = self._each[self.clusters.drawn(light)[0]]
+        commands["instances"] = 1
+        self._commands.write(commands.tobytes())
+        self._array(program).render_indirect(self._commands, self.gpu.ctx.TRIANGLES, count=len(commands))
 
     def draw(self, program: Program, visible: Bools, patches: bool = False) -> None:
         """Draw cluster c for light l wherever visible[l, c], bool (lights, clusters).

@@ -73,22 +73,25 @@ class SceneBuffers:
         """The scene's triangles in clusters, made when first drawn so."""
         if OWN not in self._clustered:
             g = self._scene.geometry
-            self._clustered[OWN] = self._cluster(g.positions, g.faces, self._attributes["position"][0])
+            uploaded = self._attributes["position"][0]
+            self._clustered[OWN] = ClusterBuffers(self.gpu, Clusters(g.positions, g.faces), g.faces, uploaded)
         return self._clustered[OWN]
 
-    def stand_in(self, key: Hashable, make: Callable[[], tuple[Array, Ints]]) -> ClusterBuffers:
+    def stand_in(
+        self,
+        key: Hashable,
+        make: Callable[[], tuple[Array, Ints]],
+        cluster: Callable[[Array, Ints], Clusters] = Clusters,
+    ) -> ClusterBuffers:
         """Another mesh that is drawn in the scene's place, in clusters, kept by `key` until the scene goes.
 
-        make: gives positions (V, 3) and faces (F, 3); called for the first draw only.
+        make: gives positions (V, 3) and faces (F, 3); cluster: groups them. Both are called for the first draw only.
         """
         if key not in self._clustered:
             positions, faces = make()
             self._buffers.append(self.gpu.ctx.buffer(np.ascontiguousarray(positions, "f4").tobytes()))
-            self._clustered[key] = self._cluster(positions, faces, self._buffers[-1])
+            self._clustered[key] = ClusterBuffers(self.gpu, cluster(positions, faces), faces, self._buffers[-1])
         return self._clustered[key]
-
-    def _cluster(self, positions: Array, faces: Ints, uploaded: Any) -> ClusterBuffers:
-        return ClusterBuffers(self.gpu, Clusters(positions, faces), faces, uploaded)
 
     def _upload(self, texture: Any) -> GpuTexture:
         height, width = texture.pixels.shape[:2]

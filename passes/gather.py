@@ -1,8 +1,9 @@
 """Put sub-buffers together and filter the pattern away inside surfaces: shares, G-buffer, lights -> irradiance.
 
 A window of n x n pixels has each share once wherever it lies; the mean over the neighbours on the pixel's own surface
-is what all VPLs give there (Laine et al. 2007, section 5.2). Where too few count, on thin things, all VPLs are asked:
-those pixels are packed into rows of a second draw, so that no processor idles beside them.
+is what all VPLs give there (Laine et al. 2007, section 5.2). Where too few count, on thin things, the pixel itself asks
+the VPLs of the shares that are missing: such pixels are packed into rows of a second draw, so that no processor idles
+beside them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from deferred_ir.graph import Description, Input, Output, Pass, Texture
 from deferred_ir.io import Io
 from deferred_ir.params import param
 
-IRRADIANCE, THIN, COUNT = 0, 1, 2
+IRRADIANCE, THIN, COUNT, MISSING = range(4)
 """Image units that the shaders declare."""
 
 
@@ -31,7 +32,9 @@ class Params:
         hi=180.0,
         doc="Neighbours count whose normals differ by less, and that lie half as much off the plane.",
     )
-    fewest: float = param(0.5, lo=0.0, hi=1.0, doc="Where no larger share of the window counts, all VPLs are asked.")
+    fewest: float = param(
+        0.5, lo=0.0, hi=1.0, doc="Where no larger part of the window counts, a pixel asks the missing VPLs itself."
+    )
 
 
 class Gather(Pass):
@@ -53,7 +56,8 @@ class Gather(Pass):
         del inputs
         return {
             "irradiance": Output("irradiance from the VPLs", Texture("rgba32f")),
-            "thin": Output("pixels lit by all VPLs, row by row", Texture("r32ui"), attach=False),
+            "thin": Output("pixels that ask VPLs themselves, row by row", Texture("r32ui"), attach=False),
+            "missing": Output("of which shares, 64 bits each", Texture("rg32ui"), attach=False),
             "count": Output("how many", Texture("r32ui", (1, 1)), attach=False),
         }
 
@@ -61,7 +65,7 @@ class Gather(Pass):
         """Filter, then light the pixels that it left."""
         del frame
         gpu, vpls = io.gpu, io["vpls"]
-        for unit, name in ((IRRADIANCE, "irradiance"), (THIN, "thin"), (COUNT, "count")):
+        for unit, name in ((IRRADIANCE, "irradiance"), (THIN, "thin"), (COUNT, "count"), (MISSING, "missing")):
             io[name].bind_image(unit)
         io["count"].upload([[0]])
         angle, shares = radians(self.params.angle), io.defines["INTERLEAVE"] ** 2
@@ -78,7 +82,7 @@ class Gather(Pass):
         for start in range(0, len(vpls.records), vpls.description.block):
             gpu.barrier()
             vpls.bind_uniform(1, start // vpls.description.block)
-            program.set(end=min(vpls.description.block, len(vpls.records) - start))
+            program.set(start=start, total=len(vpls.records))
             program.draw_fullscreen()
         gpu.barrier()
 

@@ -1,4 +1,4 @@
-"""Light by all VPLs, with shadow rays, the pixels for which `gather` found too few neighbours: thin -> irradiance.
+"""Light by the missing VPLs, with shadow rays, pixels for which `gather` found too few neighbours: thin -> irradiance.
 
 Where VPLs have no maps. The list is read back, and the reference's own sum is made for its pixels on the CPU.
 """
@@ -6,28 +6,33 @@ Where VPLs have no maps. The list is read back, and the reference's own sum is m
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import closing
 from math import acos, degrees, sqrt
 from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir import vpl_reference
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.interleaving import deal
 from deferred_ir.io import Io
-from deferred_ir.surfaces import from_gbuffer
-from deferred_ir.tracing import Hits
+from deferred_ir.parallel import in_order
+from deferred_ir.surfaces import Surfaces, from_gbuffer
+from deferred_ir.tracing import Hits, Tracer
+from deferred_ir.typing import Array, Ints
+from deferred_ir.vpl_reference import Lights, Patch
 from deferred_ir.vpls import Vpls
 
 
 class ThinRays(Pass):
-    """Irradiance from all VPLs at the pixels of a list."""
+    """Irradiance from the missing VPLs at the pixels of a list."""
 
     inputs: ClassVar[Mapping[str, Input]] = {
         "vpls": Input("the VPLs", format="share"),
         "rays": Input("which VPLs are seen: connected where they have no maps", format="r32ui"),
         "thin": Input("numbers of the pixels", format="r32ui"),
         "count": Input("how many", format="r32ui"),
+        "missing": Input("bits of the shares that each asks for", format="rg32ui"),
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
     }
@@ -40,20 +45,41 @@ class ThinRays(Pass):
     def execute(self, frame: Frame, io: Io) -> None:
         """Read back, trace, upload."""
         width, height = frame.size
-        vpls, scene, tracer = io["vpls"].records, frame.scene, frame.tracer()
+        vpls, parts, scene, tracer = io["vpls"].records, io["vpls"].description.parts, frame.scene, frame.tracer()
+        count = int(io["count"].read()[0, 0, 0])
+        bits = np.zeros((height * width, 2), np.uint32)
+        bits[io["thin"].read().reshape(-1)[:count]] = io["missing"].read().reshape(-1, 2)[:count]
+        chosen = bits.any(axis=1).reshape(height, width)
+        seen = from_gbuffer(scene.camera, frame.near, io["depth"].read()[..., 0] * chosen, io["normals"].read())
         image = np.zeros((height * width, 4), np.float32)
-        chosen = np.zeros(height * width, bool)
-        chosen[io["thin"].read().reshape(-1)[: int(io["count"].read()[0, 0, 0])]] = True
-        depth = io["depth"].read()[..., 0] * chosen.reshape(height, width)
-        seen = from_gbuffer(scene.camera, frame.near, depth, io["normals"].read())
         if len(vpls) and len(seen.pixel):
-            white = np.full((len(seen.pixel), 3), np.pi)  # reflected radiance is then the irradiance
-            hits = Hits(np.zeros(len(white), int), seen.position, seen.normal, seen.shading_normal, white)
-            lights = Vpls(vpls["position"], vpls["z_axis"], vpls["emission"].astype(float), np.arange(len(vpls)))
-            fov = 2 * degrees(acos(1 - float(vpls["one_minus_cos"][0])))
-            clamp = sqrt(vpls["clamp_squared"][0]) / scene.geometry.diagonal
-            image[seen.pixel, :3] = vpl_reference.indirect(tracer, hits, lights, fov=fov, clamp=clamp)
+            image[seen.pixel, :3] = _irradiance(tracer, seen, vpls, bits[seen.pixel], parts)
         io["irradiance"].upload(image.reshape(height, width, 4))
+
+
+def _irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, parts: int) -> Array:
+    """Of surfaces (n), from those of `parts` shares of the VPLs (LIGHT records) that have a bit in bits (n, 2)."""
+    diagonal = tracer.scene.geometry.diagonal
+    lights = Lights.of(
+        tracer,
+        Vpls(vpls["position"], vpls["z_axis"], vpls["emission"].astype(float), np.arange(len(vpls))),
+        fov=2 * degrees(acos(1 - float(vpls["one_minus_cos"][0]))),
+        clamp=sqrt(vpls["clamp_squared"][0]) / diagonal,
+    )
+    starts = deal(len(vpls), round(parts**0.5))[1].tolist()
+    hits = Hits(np.zeros(len(bits), int), seen.position, seen.normal, seen.shading_normal, np.ones((len(bits), 3)))
+    rows = [np.flatnonzero(bits[:, share // 32] >> np.uint32(share % 32) & 1) for share in range(parts)]
+    tasks = [share for share in range(parts) if len(rows[share]) and starts[share] < starts[share + 1]]
+
+    def work(share: int) -> Array:
+        return Patch(tracer, hits.rows(rows[share])).irradiance(lights, slice(starts[share], starts[share + 1]))
+
+    total = np.zeros((len(bits), 3))
+    with closing(in_order(work, tasks)) as results:
+        for share, part in zip(tasks, results, strict=True):
+            total[rows[share]] += part.T
+    irradiance: Array = total / diagonal**2
+    return irradiance
 
 
 PASS = ThinRays

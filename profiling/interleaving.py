@@ -33,7 +33,7 @@ CROP = slice(330, 458), slice(150, 278)
 """Rows and columns of the pictures: the foot of a box of `cornell`."""
 HEAD = (
     *("scene", "VPLs", "n", "all VPLs, ms", "shares, ms", "filter, ms", "times faster", "more than 1/n^2, ms"),
-    *("lit by all", "relMSE", "energy"),
+    *("ask themselves", "relMSE", "energy"),
 )
 
 
@@ -73,9 +73,9 @@ def compare(scene: Scene, vpls: int) -> list[dict[str, Any]]:
     ]
 
 
-def _read(renderer: Renderer, *source: str) -> Array:
+def _read(renderer: Renderer, name: str, port: str) -> Array:
     with renderer.gpu.ctx:
-        array: Array = renderer.executor.resource(tuple(source)).read()
+        array: Array = renderer.executor.resource((name, port)).read()
     return array
 
 

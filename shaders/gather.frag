@@ -59,11 +59,18 @@ void main() {
     // has every share.
     ivec2 corner = clamp(c.pixel - N / 2, ivec2(0), max(c.size - N, 0));
     vec4 sum = vec4(0.0);
+    uvec2 found = uvec2(0u);  // a bit for each share
     for (int y = 0; y < N; ++y)
-        for (int x = 0; x < N; ++x) sum += neighbour(c, corner + ivec2(x, y));
-    bool lonely = sum.a <= fewest;
+        for (int x = 0; x < N; ++x) {
+            ivec2 other = corner + ivec2(x, y), block = other % N;
+            vec4 one = neighbour(c, other);
+            int share = block.y * N + block.x;
+            sum += one;
+            found[share >> 5] |= uint(one.a) << (share & 31);
+        }
+    bool lonely = sum.a <= fewest && sum.a < float(SHARES);
 #if HAS_NEAR_FIELD
-    // What the clamp took is missing there, too, and what neighbours have of it is less noisy than the pixel's own.
+    // It is no share's: neighbours have parts of it whichever they are.
     vec4 given = vec4(0.0);
     int alone = lonely ? N : 0;
     for (int y = 0; y < alone; ++y)
@@ -71,23 +78,28 @@ void main() {
             ivec2 other = corner + ivec2(x, y);
             given += texelFetch(near_field, other, 0) * neighbour(c, other).a;
         }
-    irradiance.rgb = given.rgb / max(given.a, 1e-3);
+    vec3 near = given.rgb / max(given.a, 1e-3);
+#else
+    const vec4 given = vec4(0.0);
+    const vec3 near = vec3(0.0);
 #endif
     if (lonely) {
-        uint number = imageAtomicAdd(count, ivec2(0), 1u);
-        imageStore(thin, thin_place(number, c.size.x), uvec4(c.pixel.y * c.size.x + c.pixel.x));
+        irradiance.rgb = (sum.rgb - given.rgb) / float(SHARES) + near;
+        ivec2 place = thin_place(imageAtomicAdd(count, ivec2(0), 1u), c.size.x);
+        imageStore(thin, place, uvec4(c.pixel.y * c.size.x + c.pixel.x));
+        imageStore(missing, place, uvec4(~found, 0u, 0u));
         return;
     }
     // A share that is missing on one side of the pixel may be there on the other. (Where a loop has nothing to do for a
     // group of pixels it is skipped; a branch may not be.)
-    int missing = sum.a < float(SHARES) ? SHARES : 0;
-    for (int tap = 0; tap < missing; ++tap) {
+    int taps = sum.a < float(SHARES) ? SHARES : 0;
+    for (int tap = 0; tap < taps; ++tap) {
         ivec2 other = corner + ivec2(tap % N, tap / N), turn = N - 2 * N * ivec2(greaterThanEqual(other, c.pixel));
         if (neighbour(c, other).a > 0.0) continue;
-        vec4 found = neighbour(c, other + ivec2(turn.x, 0));
-        if (found.a == 0.0) found = neighbour(c, other + ivec2(0, turn.y));
-        if (found.a == 0.0) found = neighbour(c, other + turn);
-        sum += found;
+        vec4 one = neighbour(c, other + ivec2(turn.x, 0));
+        if (one.a == 0.0) one = neighbour(c, other + ivec2(0, turn.y));
+        if (one.a == 0.0) one = neighbour(c, other + turn);
+        sum += one;
     }
     irradiance.rgb = sum.rgb / sum.a;
 }

@@ -1,4 +1,4 @@
-// All VPLs of a block, at a pixel of the list; added to what is known there.
+// VPLs of a block whose shares are missing at a pixel of the list; added to what is known there.
 #include "lib/frame.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/light.glsl"
@@ -8,7 +8,8 @@
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 layout(binding = 0, rgba32f) uniform image2D irradiance;
-uniform int end;
+uniform int start;  // number of the block's first VPL
+uniform int total;  // of all VPLs
 
 void main() {
     ivec2 place = ivec2(gl_FragCoord.xy), size = textureSize(depth, 0);
@@ -18,7 +19,14 @@ void main() {
     vec4 code = texelFetch(normals, pixel, 0);
     vec3 shading_normal = from_octahedral(code.xy), normal = from_octahedral(code.zw);
     vec3 sum = vec3(0.0);
-    for (int i = 0; i < end; ++i)
-        sum += vpl_irradiance(lights[i], position, normal, shading_normal) * VPL_VISIBILITY(lights[i]);
+    uvec2 bits = imageLoad(missing, place).rg;
+    const int shares = INTERLEAVE * INTERLEAVE;
+    for (int share = 0; share < shares; ++share) {
+        int first = share * total / shares, last = (share + 1) * total / shares;  // deferred_ir/interleaving.py deals so
+        bool wanted = ((bits[share >> 5] >> (share & 31)) & 1u) == 1u;
+        int end = wanted ? min(last - start, LIGHTS_PER_BLOCK) : 0;  // nothing is looped over where no pixel wants it
+        for (int i = max(first - start, 0); i < end; ++i)
+            sum += vpl_irradiance(lights[i], position, normal, shading_normal) * VPL_VISIBILITY(lights[i]);
+    }
     imageStore(irradiance, pixel, imageLoad(irradiance, pixel) + vec4(sum, 0.0));
 }

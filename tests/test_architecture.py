@@ -17,7 +17,7 @@ LONGEST = 350
 OPEN_TO_PASSES = {
     *("graph", "params", "gl", "camera", "lights", "tracing", "timing", "sampling", "errors", "typing"),
     *("frame", "io", "maps", "map_meshes", "paraboloid_maps", "vpls"),
-    *("near_field", "surfaces", "resampling", "interleaving", "ray_visibility", "vpl_reference"),
+    *("near_field", "surfaces", "resampling", "interleaving", "ray_visibility", "vpl_reference", "parallel"),
 }
 CLOSED_TO_PASSES = {"renderer", "executor", "config", "cli", "doctor", "viewer"}
 

@@ -33,10 +33,10 @@ def read(one, source):
         return one.executor.resource(source).read()
 
 
-def irradiance(tracer, hits, vpls):
+def irradiance(tracer, hits, vpls, clamp=0.02):
     """Of all VPLs by the reference, (n, 3)."""
     white = replace(hits, albedo=np.full(hits.albedo.shape, np.pi))
-    return vpl_reference.indirect(tracer, white, vpls, fov=179.9, clamp=0.02)
+    return vpl_reference.indirect(tracer, white, vpls, fov=179.9, clamp=clamp)
 
 
 @pytest.mark.parametrize(("n", "count"), [(4, 45), (2, 500)])
@@ -72,13 +72,17 @@ def test_places_are_those_of_the_sub_buffers():
         assert (row.min(), row.max(), column.min(), column.max()) == (y, y + height - 1, x, x + width - 1)
 
 
-def test_thin_things_ask_all_vpls(renderer):
-    """With `fewest` at 1 every pixel is a thin thing, and the picture is the reference's."""
+def test_thin_things_ask_the_missing_vpls(renderer):
+    """Where no neighbour counts every pixel is a thin thing, and the picture is the reference's."""
     scene = crooked_room()
-    one, _ = drawn(renderer, scene, 40, **{"gather.fewest": 1.0})
-    image = read(one, ("thin_rays", "irradiance"))[::-1, :, :3]
+    one, _ = drawn(renderer, scene, 40, **{"gather.fewest": 1.0, "gather.angle": 0.0, "vpl.clamp": 0.0})
+    known, asked = (
+        read(one, source)[::-1, :, :3] for source in (("gather", "irradiance"), ("thin_rays", "irradiance"))
+    )
+    image = known + asked
+    assert asked.mean() > 0.9 * image.mean()
     hits = PathTracer(scene, one.tracer()).seen(SIZE)
-    expected = irradiance(one.tracer(), hits, cast(scene.spotlight, one.tracer(), 40, "sobol"))
+    expected = irradiance(one.tracer(), hits, cast(scene.spotlight, one.tracer(), 40, "sobol"), clamp=0.0)
     assert share_off(image, expected.reshape(image.shape), np.ones(image.shape[:2], bool)) < 0.01
 
 

@@ -39,6 +39,7 @@ FORMATS = {
     "rgba16": Format(0x805B, 0x1908, 0x1406, 4, "f4", 8),
     "rgba8": Format(0x8058, 0x1908, 0x1401, 4, "u1", 4),
     "r32f": Format(0x822E, 0x1903, 0x1406, 1, "f4", 4),
+    "rg32ui": Format(0x823C, 0x8228, 0x1405, 2, "u4", 8),
     "r32ui": Format(0x8236, 0x8D94, 0x1405, 1, "u4", 4),
     "depth32f": Format(0x8CAC, 0x1902, 0x1406, 1, "f4", 4),
 }

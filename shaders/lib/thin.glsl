@@ -1,6 +1,8 @@
-// The list of pixels that need all VPLs: packed into rows as wide as the frame.
+// The list of pixels beside which shares are missing: packed into rows as wide as the frame. `missing` has bit s of 64 for
+// share s; the image `thin` the number of the pixel.
 layout(binding = 1, r32ui) uniform uimage2D thin;
 layout(binding = 2, r32ui) uniform uimage2D count;
+layout(binding = 3, rg32ui) uniform uimage2D missing;
 
 ivec2 thin_place(uint number, int width) {
     return ivec2(number % uint(width), number / uint(width));

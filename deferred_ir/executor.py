@@ -16,7 +16,7 @@ from .gl.gpu import Gpu
 from .gl.resources import Framebuffer, GpuBuffer, GpuTexture
 from .gl.shaders import ShaderLibrary
 from .gl.timers import Timers
-from .graph import Buffer, Description, Plan, Texture
+from .graph import Buffer, Description, Plan, Step, Texture
 from .io import Io, Resource
 
 FRAME_BLOCK = 0
@@ -61,6 +61,17 @@ class Executor:
         if found is None:
             raise KeyError(f"{source[0]}.{source[1]} is not in the plan")
         return found
+
+    def ports(self, step: Step) -> dict[str, Any]:
+        """Resources that a step of the plan reads and writes, by port."""
+        sources = {port: source for port, source in step.sources.items() if source}
+        sources |= {port: (step.name, port) for port in step.outputs}
+        return {port: self.resource(source) for port, source in sources.items()}
+
+    def forget(self) -> None:
+        """Drop what passes keep from frame to frame."""
+        for resource in self._all():
+            resource.kept = None
 
     def memory(self) -> dict[str, int]:
         """Bytes of this executor's textures and buffers."""

@@ -88,6 +88,9 @@ class Output:
     attach: bool = True
 
 
+NO_PORTS: Mapping[str, Any] = {}
+
+
 @dataclass(frozen=True)
 class Facts:
     """What compile() may know of scene and settings, to leave passes out."""
@@ -137,9 +140,14 @@ class Pass:
         del facts
         return None
 
-    def subpasses(self, inputs: Mapping[str, Description | None]) -> Sequence[Mapping[str, Any]]:
-        """The parts that the pass plans for itself, one dictionary each, for whoever looks at the plan."""
-        del inputs
+    def subpasses(
+        self, inputs: Mapping[str, Description | None], ports: Mapping[str, Any] = NO_PORTS
+    ) -> Sequence[Mapping[str, Any]]:
+        """The parts that the pass plans for itself, one dictionary each, for whoever looks at the plan.
+
+        ports: its resources after a frame; then the parts are those of that frame.
+        """
+        del inputs, ports
         return ()
 
     def execute(self, frame: Any, io: Any) -> None:

@@ -24,8 +24,10 @@ def draw(mesh: ClusterBuffers, io: Io, params: MapParams, records: np.ndarray, c
     layered: into an atlas.
     """
     gpu, clusters = io.gpu, mesh.clusters
-    visible = clusters.visible(records, hemisphere=True) & chosen[:, None]
-    straight = params.tessellation == "pre" and (records["tile"][chosen] >= 0).all()
+    lights = np.flatnonzero(chosen)
+    records = records[lights]
+    visible = clusters.visible(records, hemisphere=True)
+    straight = params.tessellation == "pre" and (records["tile"] >= 0).all()
     bent = np.False_ if straight else clusters.bent(records, params.reach(records))
     gpu.clip(5)  # behind the light, and the map's four sides
     geometry = ["paraboloid.geom"] if layered and not gpu.layer_from_vertex else []
@@ -35,5 +37,5 @@ def draw(mesh: ClusterBuffers, io: Io, params: MapParams, records: np.ndarray, c
             defines: dict[str, int | float] = {"SPLIT": int(split), "STRAIGHT": int(straight)}
             defines |= {"BEND": float(params.bend), "LEAST_REACH": LEAST_REACH}
             program = io.program(*files, defines=defines)
-            mesh.draw(program, share, patches=split)
+            mesh.draw(program, share, lights, patches=split)
     gpu.clip(0)

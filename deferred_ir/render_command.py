@@ -52,6 +52,7 @@ def render(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
         record = Record() if json else None
         if record:
             renderer.draw(scene, plan, seed=seed)  # compiles, allocates: not what a frame costs
+            renderer.reset()
         black = bool(outputs)
         for picture in _pictures(renderer, scene, plan, arguments, seed=seed, record=record):
             last = picture.interrupted or picture.number == arguments.frames - 1

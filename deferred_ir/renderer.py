@@ -138,6 +138,10 @@ class Renderer:
                 record.laps += timers.collect()
                 record.counters.append(dict(self.executor.counters))
 
+    def reset(self) -> None:
+        """Drop what passes keep from frame to frame (graph `incremental`): the next frame starts afresh."""
+        self.executor.forget()
+
     def finish(self, record: Record) -> None:
         """Add the timestamps still in flight to `record`."""
         with self.gpu.ctx:
@@ -176,6 +180,7 @@ class Renderer:
         if self._scene and all(getattr(scene, part) is getattr(self._scene, part) for part in surfaces):
             return
         self._forget()
+        self.reset()
         self._buffers, self._scene = SceneBuffers(self.gpu, scene), scene
 
     def tracer(self) -> Tracer:

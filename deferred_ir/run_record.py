@@ -35,9 +35,8 @@ def run_record(
     passes: list[dict[str, Any]] = [dict(entry) for entry in record.passes()]
     for entry in passes:
         step = next((step for step in plan.steps if step.name == entry["name"]), None)
-        if step and (subpasses := step.work.subpasses(step.descriptions)):
-            alive = subpasses[: last.get("maps_drawn", len(subpasses))]
-            entry["subpasses"] = [dict(subpass) for subpass in alive]
+        if step and (subpasses := step.work.subpasses(step.descriptions, renderer.executor.ports(step))):
+            entry["subpasses"] = [dict(subpass) for subpass in subpasses]
     return {
         "scene": scene.name,
         "scene_hash": scene.hash,

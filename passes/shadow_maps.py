@@ -11,10 +11,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+import numpy as np
+
 from deferred_ir import map_meshes, paraboloid_maps
 from deferred_ir.frame import Frame
-from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
+from deferred_ir.graph import NO_PORTS, Buffer, Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.io import Io
+from deferred_ir.kept_maps import KeptMaps
 from deferred_ir.lights import LIGHTS_PER_BLOCK
 from deferred_ir.maps import MapParams
 
@@ -52,8 +55,10 @@ class ShadowMaps(Pass):
         """A dark spotlight makes no VPLs either."""
         return None if facts.emits else "no light needs one: the spotlight emits nothing"
 
-    def subpasses(self, inputs: Mapping[str, Description | None]) -> Sequence[Mapping[str, Any]]:
-        """A sub-pass for each light that the buffer can hold."""
+    def subpasses(
+        self, inputs: Mapping[str, Description | None], ports: Mapping[str, Any] = NO_PORTS
+    ) -> Sequence[Mapping[str, Any]]:
+        """A sub-pass for each light that the buffer can hold; after a frame, for each that it holds."""
         per_layer, why = self._tiles_per_layer(), "every frame redoes everything"
         spot = {"light": "spotlight", "projection": "perspective", "layer": 0, "tile": 0, "size": self.params.spot_size}
         tiles = [
@@ -61,12 +66,13 @@ class ShadowMaps(Pass):
             | {"tile": i % per_layer, "size": self.params.vpl_size}
             for i in range(_lights(inputs) - 1)
         ]
-        return [{**tile, "state": "dirty", "why": why} for tile in [spot, *tiles]]
+        parts = [{**tile, "state": "dirty", "why": why} for tile in [spot, *tiles]]
+        return ports["atlas"].kept.told(parts) if ports else parts
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Clear, then draw for each light what it may see."""
+        """Clear, then draw for each light what it may see, unless its map is there already."""
         gpu, lights = io.gpu, io["lights"]
-        io.framebuffer.clear_depth()
+        kept = KeptMaps.of(io, self.params)
         self.params.prepare(gpu)
         geometry = [] if gpu.layer_from_vertex else ["shadow_maps.geom"]
         program = io.program("depth.frag", "shadow_maps.vert", *geometry)
@@ -74,14 +80,17 @@ class ShadowMaps(Pass):
         for start in range(0, total, LIGHTS_PER_BLOCK):
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
             records = lights.records[start : min(start + LIGHTS_PER_BLOCK, total)]
-            curved = self.params.paraboloid(records)
-            for mesh, drawn in map_meshes.shares(frame, self.params, records):
+            curved, dirty = self.params.paraboloid(records), kept.dirty[start : start + len(records)]
+            for mesh, share in map_meshes.shares(frame, self.params, records):
+                drawn = share & dirty
                 if (drawn & ~curved).any():
                     gpu.clip(4)
-                    mesh.draw(program, mesh.clusters.visible(records) & (drawn & ~curved)[:, None])
+                    planar = np.flatnonzero(drawn & ~curved)
+                    mesh.draw(program, mesh.clusters.visible(records[planar]), planar)
                 if (drawn & curved).any():
                     paraboloid_maps.draw(mesh, io, self.params, records, drawn & curved, layered=True)
-        io.count("maps_drawn", total)
+        kept.remember()
+        io.count("maps_drawn", int(kept.dirty.sum()))
         if total > 1:
             map_meshes.count(frame, io, self.params)
 

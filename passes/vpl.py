@@ -4,47 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import sqrt
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from deferred_ir.frame import Frame
-from deferred_ir.graph import Buffer, Description, Facts, Output, Pass
+from deferred_ir.graph import Description, Facts, Output, Pass
 from deferred_ir.io import Io
-from deferred_ir.lights import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
 from deferred_ir.params import param
 from deferred_ir.resampling import effects, probes, resample
 from deferred_ir.sampling import Pattern, warn_unbalanced
+from deferred_ir.vpl_buffer import VplParams, output, packed
 from deferred_ir.vpls import NONE, Vpls, cast
-
-AUTO_CLAMP = 0.64
-"""Clamp distance of one VPL in diagonals where short rays give back what it takes: best at 64 to 1024 VPLs of both a
-room and a cathedral, and flat about there (half or twice of it costs a tenth to a half of the error)."""
 
 
 @dataclass(frozen=True)
-class Params:
-    """Parameters of the VPLs."""
+class Params(VplParams):
+    """Parameters of VPLs that are cast anew in each frame."""
 
-    count: int = param(64, lo=0, hi=65536, doc="Rays that leave the spotlight; each that lands makes a VPL.")
     pattern: Pattern = param("sobol", doc="Sample pattern on the disc of directions.")
     bounces: int = param(1, lo=1, hi=64, doc="Diffuse bounces; each beyond the first adds VPLs.")
-    fov: float = param(150.0, lo=1.0, hi=179.9, doc="Full opening angle of the cone a VPL shines into, degrees.")
-    clamp: float | Literal["auto"] = param(
-        0.02,
-        lo=0.0,
-        hi=10.0,
-        doc="Distance below which 1/d^2 is held, as a fraction of the scene's diagonal; auto: 0.64 / sqrt(count).",
-    )
     candidates: int = param(
         1, lo=1, hi=64, doc="Rays for each VPL that is kept, chosen by what it adds to the image. 1: all are kept."
     )
-
-    @property
-    def clamp_fraction(self) -> float:
-        """The clamp distance in diagonals. auto: in proportion to the distance between VPLs, whose spikes it holds."""
-        return AUTO_CLAMP / sqrt(max(self.count, 1)) if self.clamp == "auto" else self.clamp
 
 
 class Vpl(Pass):
@@ -59,9 +41,7 @@ class Vpl(Pass):
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """One buffer with room for the spotlight and a VPL for each ray of each bounce."""
         del inputs
-        records = Buffer("light", 1 + self.params.count * self.params.bounces, LIGHT.itemsize, LIGHTS_PER_BLOCK)
-        defines = {"LIGHTS_PER_BLOCK": LIGHTS_PER_BLOCK, "BOUNCES": self.params.bounces}
-        return {"lights": Output("the spotlight, then the VPLs", records, defines)}
+        return {"lights": output(self.params.count * self.params.bounces, self.params.bounces)}
 
     def informed(self, facts: Facts) -> Facts:
         """Whether there is a clamp, and anything to clamp."""
@@ -71,15 +51,7 @@ class Vpl(Pass):
         """Cast, pack, upload."""
         light, p = frame.scene.spotlight, self.params
         vpls = self._cast(frame) if p.count > 0 and any(light.emission) else NONE
-        records = np.zeros(1 + len(vpls), LIGHT)
-        spot = np.array([light.position]), light.axis[None], np.array([light.emission])
-        fill_records(records[:1], *spot, fov=light.fov, tile=SPOT_TILE)
-        fill_records(
-            records[1:], vpls.position, vpls.normal, vpls.emission, fov=p.fov, tile=np.arange(len(vpls), dtype="f4")
-        )
-        records["clamp_squared"][0] = light.radius
-        records["clamp_squared"][1:] = (p.clamp_fraction * frame.scene.geometry.diagonal) ** 2
-        io["lights"].write(records)
+        io["lights"].write(packed(frame.scene, vpls, p, np.arange(len(vpls))))
         io.count("vpls_alive", len(vpls))
 
     def _cast(self, frame: Frame) -> Vpls:

@@ -48,12 +48,13 @@ class ClusterBuffers:
         self._commands.write(commands.tobytes())
         self._array(program).render_indirect(self._commands, self.gpu.ctx.TRIANGLES, count=len(commands))
 
-    def draw(self, program: Program, visible: Bools, patches: bool = False) -> None:
-        """Draw cluster c for light l wherever visible[l, c], bool (lights, clusters).
+    def draw(self, program: Program, visible: Bools, lights: Ints, patches: bool = False) -> None:
+        """Draw cluster c for light lights[l] of the bound block wherever visible[l, c], bool (lights, clusters).
 
-        The program reads `position` and `light_index`, the row of `visible`.
+        The program reads `position` and `light_index`.
         """
-        cluster, light = np.nonzero(visible.T)
+        cluster, row = np.nonzero(visible.T)
+        light = lights[row]
         instances = np.bincount(cluster, minlength=len(self.clusters))
         commands = self._each.copy()
         commands["instances"], commands["base_instance"] = instances, np.cumsum(instances) - instances

@@ -19,6 +19,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "CheckFramebufferStatus": (_U, _U),
     "ClearBufferfv": (None, _U, _I, _P),
     "ClearBufferuiv": (None, _U, _I, _P),
+    "ClearTexSubImage": (None, _U, *[_I] * 7, _U, _U, _P),
     "ClipControl": (None, _U, _U),
     "ColorMask": (None, _I, _I, _I, _I),
     "DeleteFramebuffers": (None, _I, _P),

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import DeviceError
 from ..graph import Buffer, Texture
+from ..typing import Ints
 from . import raw
 from .gpu import Gpu
 
@@ -47,7 +48,12 @@ FORMATS = {
 
 
 class GpuTexture:
-    """An immutable 2D texture or array of one level. `size` is (width, height)."""
+    """An immutable 2D texture or array of one level. `size` is (width, height).
+
+    kept: what its writer notes about what it holds, for the frames that follow.
+    """
+
+    kept: Any = None
 
     def __init__(self, gpu: Gpu, description: Texture, size: tuple[int, int]) -> None:
         self.gpu, self.description, self.size = gpu, description, size
@@ -98,6 +104,12 @@ class GpuTexture:
         gl.GetTexImage(self.target, 0, self.format.layout, self.format.type, pixels.ctypes.data_as(ctypes.c_void_p))
         gl.check(f"reading {self.description}")
         return pixels
+
+    def clear_part(self, layer: int, corner: tuple[int, int], edge: int) -> None:
+        """Fill a square of one layer with zeros; corner: (x, y) of its lower left texel."""
+        zero = (ctypes.c_float * 4)()
+        where = (0, *corner, layer, edge, edge, 1)
+        self.gpu.gl.ClearTexSubImage(self.glo, *where, self.format.layout, self.format.type, zero)
 
     @cached_property
     def framebuffer(self) -> Framebuffer:
@@ -154,7 +166,13 @@ class Framebuffer:
 
 
 class GpuBuffer:
-    """A buffer of records that a pass writes from the CPU; `records` is what it wrote last."""
+    """A buffer of records that a pass writes from the CPU; `records` is what it wrote last.
+
+    versions: a number for each record; as long as it is the same, so is what is drawn for that record. None: unknown.
+    kept: what its writer notes for the frames that follow.
+    """
+
+    kept: Any = None
 
     def __init__(self, gpu: Gpu, description: Buffer) -> None:
         self.gpu, self.description = gpu, description
@@ -162,12 +180,13 @@ class GpuBuffer:
         self.buffer = gpu.ctx.buffer(reserve=self.nbytes, dynamic=True)
         gpu.gl.check(f"buffer of {description}")
         self.records: np.ndarray = np.zeros(0)
+        self.versions: Ints | None = None
 
-    def write(self, records: np.ndarray) -> None:
+    def write(self, records: np.ndarray, versions: Ints | None = None) -> None:
         """Replace the first len(records) records."""
         if len(records) > self.description.records or records.itemsize != self.description.stride:
             raise ValueError(f"{len(records)} records of {records.itemsize} bytes into a buffer of {self.description}")
-        self.records = records
+        self.records, self.versions = records, versions
         self.buffer.write(records.tobytes())
 
     def bind_uniform(self, binding: int, block: int) -> None:

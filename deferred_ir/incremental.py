@@ -1,0 +1,148 @@
+"""VPLs that outlive their frame while the spotlight moves (Laine et al. 2007, "Incremental Instant Radiosity", EGSR).
+
+A VPL is a site in the disc of directions that the spotlight sends light to, in which equal areas get equal light. Each
+frame sites that the light no longer reaches are given up at once, and a few new ones fill the largest holes; each
+carries the light of its Voronoi cell, so all of the light is accounted for however many sites there are.
+
+A ray that misses stands for its site, too: the light of its cell is lost, and the hole is not tried again.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from .disc_cells import Cells, most_crowded
+from .emission_disc import EmissionDisc
+from .lights import Spotlight, frames
+from .sampling import disc as unit_disc
+from .tracing import Tracer
+from .typing import Array, Bools, Ints
+from .vpls import Vpls
+
+BETTER = 1.05
+"""A site is moved if its nearest neighbour will be farther by this factor. Above 1, so that it comes to an end."""
+MARGIN = 0.9
+"""New sites stay off the rim by this, over the root of their number: about half their distance from one another."""
+GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])
+"""Steps of the additive sequence in the unit square whose points keep apart best (Roberts 2018, R2)."""
+_numbers = itertools.count(1)
+
+
+class IncrementalVpls:
+    """At most `count` sites and what the rays through them met. Slot i keeps its VPL until that is given up.
+
+    The same `seed` and the same frames give the same VPLs again.
+    """
+
+    def __init__(self, count: int, seed: int = 0) -> None:
+        self._rng = np.random.default_rng(seed)
+        self._offset, self._born = self._rng.random(2), 0
+        self._right: Array = np.zeros(3)
+        self._spot: tuple[object, int] = None, 0
+        self.weights = np.zeros(count)
+        self.used = np.zeros(count, bool)
+        self.landed = np.zeros(count, bool)
+        self.version = np.zeros(count, np.int64)
+        self.start = np.zeros((count, 2))
+        self.direction, self.position, self.normal, self.shading_normal, self.albedo = np.zeros((5, count, 3))
+
+    def update(self, light: Spotlight, tracer: Tracer, *, least: int, most: int) -> Vpls:
+        """The VPLs of the next frame, `ray` being their slots.
+
+        light: where it is now. most: sites that may be new, and so maps; least: sites that may be new or moved to where
+        they are of more use, as long as that is not more than `most`.
+        """
+        self._turn(light)
+        disc = EmissionDisc(light, self._axes(light))
+        self.used &= self._reached(light, tracer, disc)
+        slots = np.flatnonzero(self.used)
+        cells = Cells(disc.points(self.direction[slots]))
+        free = np.flatnonzero(~self.used)[:most]
+        for _ in free:
+            cells.add(self._hole(cells)[0])
+        slots = np.concatenate([slots, free])
+        moved: list[int] = []
+        for _ in range(min(least, most) - len(free)):
+            if len(slots) < 2:
+                break
+            row, near = most_crowded(cells.sites)
+            other = Cells(np.delete(cells.sites, row, axis=0))
+            site, far = self._hole(other)
+            if far <= BETTER * near:
+                break
+            other.add(site)
+            cells, slots = other, np.append(np.delete(slots, row), slots[row])
+            moved.append(int(slots[-1]))
+        fresh = np.union1d(free, moved).astype(int)
+        self.weights[:] = 0
+        self.weights[slots] = cells.shares()
+        place = np.zeros((len(self.used), 2))
+        place[slots] = cells.sites
+        self._shoot(light, tracer, fresh, disc.directions(place[fresh]))
+        return self._lit(light, disc.power)
+
+    def spot_version(self, light: Spotlight) -> int:
+        """A number that changes when the spotlight sees something else than before."""
+        view = (light.position, light.look_at, light.fov)
+        if view != self._spot[0]:
+            self._spot = view, next(_numbers)
+        return self._spot[1]
+
+    def _turn(self, light: Spotlight) -> None:
+        """Carry the disc's frame along with the axis, so that points of a disc light stay where they are on it."""
+        right = self._right - (self._right @ light.axis) * light.axis
+        length = np.linalg.norm(right)
+        self._right = right / length if length > 0.1 else frames(light.axis)[0]
+
+    def _axes(self, light: Spotlight) -> Array:
+        return np.stack([self._right, np.cross(light.axis, self._right)])
+
+    def _origins(self, light: Spotlight) -> Array:
+        origins: Array = np.asarray(light.position, float) + light.radius * self.start @ self._axes(light)
+        return origins
+
+    def _reached(self, light: Spotlight, tracer: Tracer, disc: EmissionDisc) -> Bools:
+        """Which sites in use the light still reaches as it did; their directions are those from where it is now."""
+        chosen = np.flatnonzero(self.used & self.landed)
+        origins = self._origins(light)
+        way = self.position[chosen] - origins[chosen]
+        distance = np.linalg.norm(way, axis=1)
+        self.direction[chosen] = way / np.maximum(distance, 1e-300)[:, None]
+        reached: Bools = disc.inside(self.direction)
+        reached[chosen] &= (self.direction[chosen] * self.normal[chosen]).sum(axis=1) < 0
+        reached[chosen] &= distance > tracer.offset
+        seen = np.flatnonzero(reached & self.used & self.landed)
+        reached[seen] &= ~tracer.occluded(origins[seen], tracer.lift(self.position[seen], self.normal[seen]))
+        missed = np.flatnonzero(reached & self.used & ~self.landed)
+        reached[missed] &= ~tracer.closest(origins[missed], self.direction[missed]).hit
+        return reached
+
+    def _hole(self, cells: Cells) -> tuple[Array, float]:
+        """Where the next site goes, and how far it is from the others."""
+        if not len(cells.sites):
+            return unit_disc(self._rng.random((1, 2)))[0] / 2, np.inf
+        return cells.emptiest(1 - MARGIN / np.sqrt(len(cells.sites) + 1))
+
+    def _shoot(self, light: Spotlight, tracer: Tracer, slots: Ints, directions: Array) -> None:
+        """Rays along `directions` (m, 3), into `slots`."""
+        order = self._born + np.arange(len(slots))
+        self._born += len(slots)
+        self.start[slots] = unit_disc((self._offset + np.multiply.outer(order, GOLDEN)) % 1)
+        self.direction[slots] = directions
+        hits = tracer.closest(self._origins(light)[slots], directions)
+        self.used[slots], self.landed[slots] = True, hits.hit
+        self.position[slots], self.albedo[slots] = hits.position, hits.albedo
+        self.normal[slots], self.shading_normal[slots] = hits.normal, hits.shading_normal
+        self.version[slots] = [next(_numbers) for _ in slots]
+
+    def _lit(self, light: Spotlight, power: float) -> Vpls:
+        """What is there; each VPL carries the light of its cell."""
+        slots = np.flatnonzero(self.used & self.landed & (self.albedo > 0).any(axis=1))
+        direction = self.direction[slots]
+        carried = np.multiply.outer(power * self.weights[slots], np.asarray(light.emission, float))
+        arriving = np.maximum(-(self.shading_normal[slots] * direction).sum(axis=1), 0)
+        crossing = -(self.normal[slots] * direction).sum(axis=1)
+        ratio = np.divide(arriving, crossing, out=np.zeros(len(slots)), where=crossing > 0)
+        return Vpls(self.position[slots], self.normal[slots], carried * self.albedo[slots] * ratio[:, None], slots)

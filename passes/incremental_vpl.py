@@ -1,0 +1,66 @@
+"""VPLs that outlive their frame (Laine et al. 2007): -> lights, as the pass vpl writes them, and which of them are new.
+
+A few VPLs are new in each frame, the others stay where they are and keep their tile of the atlas, so that only the new
+ones need a map. What stays lives with the light buffer; it ends where scene, seed or parameters are others, or the
+spotlight is turned off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from deferred_ir.errors import GraphError
+from deferred_ir.frame import Frame
+from deferred_ir.graph import Description, Facts, Output, Pass
+from deferred_ir.incremental import IncrementalVpls
+from deferred_ir.io import Io
+from deferred_ir.params import param
+from deferred_ir.vpl_buffer import VplParams, output, packed
+from deferred_ir.vpls import NONE
+
+
+@dataclass(frozen=True)
+class Params(VplParams):
+    """Parameters of VPLs that stay."""
+
+    least: int = param(4, lo=0, hi=65536, doc="VPLs that a frame may replace to spread them better; at most `most`.")
+    most: int = param(8, lo=0, hi=65536, doc="Most new VPLs in a frame, and so most maps of VPLs that it draws.")
+
+
+class IncrementalVpl(Pass):
+    """Keeps the VPLs that the spotlight still reaches, casts a few new ones and packs them for the shaders."""
+
+    Params = Params
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """One buffer with room for the spotlight and a VPL for each ray."""
+        del inputs
+        if self.params.least > self.params.most:
+            raise GraphError(f"least {self.params.least}: is more than most, {self.params.most}; give both")
+        return {"lights": output(self.params.count)}
+
+    def informed(self, facts: Facts) -> Facts:
+        """Whether there is a clamp, and anything to clamp."""
+        return replace(facts, clamped=self.params.clamp_fraction > 0 and self.params.count > 0)
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Go on from what the last frame left, pack, upload."""
+        light, p, lights = frame.scene.spotlight, self.params, io["lights"]
+        if p.count == 0 or not any(light.emission):
+            lights.kept = None
+            lights.write(packed(frame.scene, NONE, p, NONE.ray))
+            return
+        key = p, frame.seed
+        if lights.kept is None or lights.kept[0] != key:
+            lights.kept = key, IncrementalVpls(p.count, frame.seed)
+        state: IncrementalVpls = lights.kept[1]
+        vpls = state.update(light, frame.tracer(), least=p.least, most=p.most)
+        versions = np.append(state.spot_version(light), state.version[vpls.ray])
+        lights.write(packed(frame.scene, vpls, p, vpls.ray), versions)
+        io.count("vpls_alive", len(vpls))
+
+
+PASS = IncrementalVpl

@@ -65,7 +65,7 @@ class LimitMaps(ShadowMaps):
         io.framebuffer.clear_depth()
         self.params.prepare(io.gpu)
         program = io.program("depth.frag", "plain_maps.vert")
-        maps = self.subpasses({"lights": lights.description})[: len(lights.records)]
+        maps = self.subpasses({**dict.fromkeys(self.inputs), "lights": lights.description})[: len(lights.records)]
         for i, place in enumerate(maps):
             size, row = place["size"], edge // place["size"]
             if i % LIGHTS_PER_BLOCK == 0:

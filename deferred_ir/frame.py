@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from .gl.resources import GpuTexture
 from .gl.scene_buffers import SceneBuffers
 from .lights import NEAR
 from .scene import Scene
+from .surfaces import Surfaces, from_gbuffer
 from .tracing import Tracer
 from .typing import Vec3
 
@@ -34,11 +36,22 @@ class Frame:
     tracer: Callable[[], Tracer]
     seed: int = 0
     time: float = 0.0
+    _surfaces: dict[tuple[GpuTexture, GpuTexture], Surfaces] = field(default_factory=dict, init=False)
 
     @property
     def near(self) -> float:
         """Near plane of the camera and of all lights, in world units."""
         return NEAR * self.scene.geometry.diagonal
+
+    def surfaces(self, depth: GpuTexture, normals: GpuTexture) -> Surfaces:
+        """What the pixels of a G-buffer show, read back when first asked for: after both textures were written."""
+        key = depth, normals
+        if key not in self._surfaces:
+            smooth = self.scene.geometry.normals is not None
+            self._surfaces[key] = from_gbuffer(
+                self.scene.camera, self.near, depth.read()[..., 0], normals.read(), smooth=smooth
+            )
+        return self._surfaces[key]
 
     def block(self) -> bytes:
         """The FRAME record."""

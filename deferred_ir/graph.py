@@ -65,6 +65,7 @@ class Input:
     """A port that reads. `format` None takes any. Filter and comparison belong to the reader, not to the texture.
 
     `attach`: a depth texture that the pass tests against, attached to its framebuffer instead of sampled.
+    `replaces`: optional, and where it is connected the pass is left out, for its readers use the source instead.
     """
 
     doc: str
@@ -73,6 +74,7 @@ class Input:
     linear: bool = False
     compare: str | None = None
     attach: bool = False
+    replaces: bool = False
 
 
 @dataclass(frozen=True)
@@ -254,21 +256,26 @@ def _resolve(graph: Graph, outputs: Sequence[str], faults: list[str]) -> tuple[R
 
 
 def _leave_out(graph: Graph, edges: Edges, facts: Facts) -> dict[str, str]:
-    """Passes that this scene does not need, and those that cannot run without them."""
+    """Passes that this scene does not need or others replace, and those that cannot run without them."""
     unneeded = {node.name: why for node in graph.nodes.values() if (why := node.work.unneeded(facts))}
-    changed = True
-    while changed:
-        changed = False
-        for node in graph.nodes.values():
-            for port, source in edges[node.name].items():
-                gone = source is not None and source[0] in unneeded and not node.work.inputs[port].optional
-                if gone and source and node.name not in unneeded:
-                    unneeded[node.name] = f"its input {port} comes from {source[0]}, which is left out"
-                    changed = True
-    for ports in edges.values():
-        for port, source in ports.items():
-            if source is not None and source[0] in unneeded:
-                ports[port] = None
+    wires = [(name, port, source) for name, ports in edges.items() for port, source in ports.items() if source]
+
+    def spread() -> None:
+        known = -1
+        while known < len(unneeded):
+            known = len(unneeded)
+            for name, port, (source, _) in wires:
+                if source in unneeded and not graph.nodes[name].work.inputs[port].optional:
+                    unneeded.setdefault(name, f"its input {port} comes from {source}, which is left out")
+
+    spread()
+    for name, port, (source, _) in wires:
+        if source not in unneeded and graph.nodes[name].work.inputs[port].replaces:
+            unneeded.setdefault(name, f"{source} makes it needless")
+    spread()
+    for name, port, (source, _) in wires:
+        if source in unneeded:
+            edges[name][port] = None
     return unneeded
 
 

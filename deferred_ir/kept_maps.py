@@ -33,9 +33,8 @@ class KeptMaps:
     def of(cls, io: Io, params: MapParams) -> KeptMaps:
         """For the frame at hand: clears the places of lights that must be drawn, or the whole atlas."""
         atlas, lights = io["atlas"], io["lights"]
-        total = 1 if io["rays"] else len(lights.records)
-        places = lights.records["tile"][:total].astype(int) + 1
-        versions = None if lights.versions is None else lights.versions[:total]
+        places = lights.records["tile"].astype(int) + 1
+        versions = lights.versions
         before: KeptMaps | None = atlas.kept
         if versions is not None and before and before.versions is not None and before.params == params:
             kept = cls(params, places, versions, before.held[places] != versions, before.held)
@@ -43,7 +42,7 @@ class KeptMaps:
         else:
             io.framebuffer.clear_depth()
             tiles = (atlas.description.layers - 1) * (atlas.size[0] // params.vpl_size) ** 2
-            kept = cls(params, places, versions, np.ones(total, bool), np.zeros(1 + tiles, np.int64))
+            kept = cls(params, places, versions, np.ones(len(places), bool), np.zeros(1 + tiles, np.int64))
         atlas.kept = kept
         return kept
 

@@ -14,11 +14,10 @@ from __future__ import annotations
 
 from contextlib import closing
 from dataclasses import dataclass
-from functools import lru_cache
-from math import gcd
 
 import numpy as np
 
+from . import block_points
 from .direct_light import lit_by
 from .lights import Spotlight
 from .parallel import in_order
@@ -71,20 +70,20 @@ def residual(
     if limits.clamp <= 0:
         return image.reshape(height, width, 4)
     dealing = np.random.default_rng(seed)
-    traced, index, total = _pattern(seen.pixel, width, samples, block, int(dealing.integers(block * block)))
+    traced, index, total = block_points.deal(seen.pixel, width, samples, block, int(dealing.integers(block * block)))
     shift = dealing.random(2, np.float32)
     each = index.shape[1]
     weight = block * block * each / total
     per_task = max(1, RAYS // each)
     tasks = [(i, slice(start, start + per_task)) for i, start in enumerate(range(0, len(traced), per_task))]
-    lattice = _lattice(total)
+    lattice = block_points.lattice(total)
     rays, emission = _Rays(tracer, light, seen, limits, bounces), np.asarray(light.emission, float)
 
     def work(task: tuple[int, slice]) -> Array:
         number, chosen = task
         rng = np.random.default_rng([seed, number])
         rows = np.repeat(traced[chosen], each)
-        points = (_points(index[chosen].reshape(-1), lattice, rng) + shift) % 1
+        points = (block_points.jittered(index[chosen].reshape(-1), lattice, rng) + shift) % 1
         brought: Array = rays.bring(rows, points, rng).reshape(-1, each, 3).mean(axis=1) * emission
         return brought
 
@@ -145,65 +144,3 @@ def _about(shading_normals: Array, normals: Array, points: Array) -> tuple[Array
     above = np.flatnonzero((np.einsum("ij,ij->i", directions, normals) > 0) & (square > 0))
     directions /= np.sqrt(np.maximum(square, np.finfo(directions.dtype).tiny))[:, None]
     return directions, above
-
-
-def _pattern(pixel: Ints, width: int, samples: float, block: int, turn: int) -> tuple[Ints, Ints, int]:
-    """Rows of `pixel` that trace, numbers of their rays' cells (m, rays a pixel), and how many cells a block has.
-
-    turn: below block^2, which way of dealing the cells to the pixels.
-    """
-    cells = block * block
-    y, x = np.divmod(pixel, width)
-    rank = _ranks(block)[y % block, x % block] ^ turn
-    if samples < 1:
-        few = max(round(cells * samples), 1)
-        traced = np.flatnonzero(rank < few)
-        return traced, rank[traced, None], few
-    each = round(samples)
-    return np.arange(len(pixel)), rank[:, None] + cells * np.arange(each), cells * each
-
-
-@lru_cache
-def _ranks(block: int) -> Ints:
-    """Bayer's ordered dither: the numbers below block^2, neighbours far apart, and any first few spread evenly."""
-    ranks = np.zeros((1, 1), int)
-    while len(ranks) < block:
-        ranks = np.block([[4 * ranks, 4 * ranks + 2], [4 * ranks + 3, 4 * ranks + 1]])
-    return ranks
-
-
-@lru_cache
-def _lattice(count: int) -> tuple[int, int, Array]:
-    """A rank-1 lattice of `count` points (i, g i mod count) / count: count, g, and its two shortest steps (2, 2).
-
-    g makes the longer of the steps as short as it can be.
-    """
-    best: tuple[float, int, Array] | None = None
-    for g in range(1, count + 1):
-        if gcd(g, count) == 1:
-            steps = _reduced(np.array([1, g]), np.array([0, count]))
-            longer = float((steps[1] ** 2).sum())
-            if best is None or longer < best[0]:
-                best = longer, g, steps / count
-    assert best  # 1 is coprime to every count
-    return count, best[1], best[2].astype(np.float32)
-
-
-def _reduced(a: Ints, b: Ints) -> Ints:
-    """The lattice of integer vectors a and b by its two shortest steps, the shorter first (Gauss's reduction)."""
-    while True:
-        if a @ a > b @ b:
-            a, b = b, a
-        times = round(float(a @ b) / float(a @ a))
-        if times == 0:
-            return np.stack([a, b])
-        b = b - times * a
-
-
-def _points(index: Ints, lattice: tuple[int, int, Array], rng: np.random.Generator) -> Array:
-    """A random point in the cell of each lattice point, float32 (n, 2). Cells are parallelograms that tile it."""
-    count, g, steps = lattice
-    jitter = rng.random((len(index), 2), np.float32) @ steps
-    corner = np.stack([index, index * g % count], axis=1).astype(np.float32) / np.float32(count)
-    points: Array = (corner + jitter) % 1
-    return points

@@ -23,6 +23,12 @@ class Surfaces:
     normal: Array
     shading_normal: Array
 
+    def rows(self, chosen: Ints | slice) -> Surfaces:
+        """Some of them: indices (m,) or a slice."""
+        normal = self.normal[chosen]
+        smooth = normal if self.shading_normal is self.normal else self.shading_normal[chosen]
+        return Surfaces(self.pixel[chosen], self.position[chosen], normal, smooth)
+
 
 def from_gbuffer(camera: Camera, near: float, depth: Array, normals: Array, *, smooth: bool = True) -> Surfaces:
     """Decode reversed `depth` (H, W) and octahedral `normals` (H, W, 4), float32, bottom row first.

@@ -23,6 +23,7 @@ class Lighting(Pass):
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
         "albedo": Input("reflectance", format="rgba16f"),
+        "spotlight": Input("irradiance from the spotlight over its emission, instead of a map", "r32f", optional=True),
         "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
         "indirect": Input("irradiance from the VPLs, instead of adding them up", format="rgba32f", optional=True),
         "thin": Input("irradiance where the filter has left it out", format="rgba32f", optional=True),

@@ -16,7 +16,6 @@ from deferred_ir.graph import Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.io import Io
 from deferred_ir.near_field import VplLimits, residual
 from deferred_ir.params import param
-from deferred_ir.surfaces import from_gbuffer
 
 
 @dataclass(frozen=True)
@@ -58,18 +57,10 @@ class NearField(Pass):
         if len(vpl) == 0:
             io.framebuffer.clear_color()
             return
-        scene = frame.scene
-        seen = from_gbuffer(
-            scene.camera,
-            frame.near,
-            io["depth"].read()[..., 0],
-            io["normals"].read(),
-            smooth=scene.geometry.normals is not None,
-        )
         image = residual(
             frame.tracer(),
-            scene.spotlight,
-            seen,
+            frame.scene.spotlight,
+            frame.surfaces(io["depth"], io["normals"]),
             frame.size,
             VplLimits(clamp=sqrt(vpl["clamp_squared"][0]), cosine=1 - float(vpl["one_minus_cos"][0])),
             samples=self.params.samples,

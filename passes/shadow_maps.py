@@ -28,7 +28,7 @@ class ShadowMaps(Pass):
     Params = MapParams
     inputs: ClassVar[Mapping[str, Input]] = {
         "lights": Input("the lights to draw maps for", format="light"),
-        "rays": Input("which VPLs are seen, by rays: then only the spotlight gets a map", "r32ui", optional=True),
+        "rays": Input("which lights are seen, by rays: then none needs a map", optional=True, replaces=True),
     }
 
     def _tiles_per_layer(self) -> int:
@@ -76,7 +76,7 @@ class ShadowMaps(Pass):
         self.params.prepare(gpu)
         geometry = [] if gpu.layer_from_vertex else ["shadow_maps.geom"]
         program = io.program("depth.frag", "shadow_maps.vert", *geometry)
-        total = 1 if io["rays"] else len(lights.records)
+        total = len(lights.records)
         for start in range(0, total, LIGHTS_PER_BLOCK):
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
             records = lights.records[start : min(start + LIGHTS_PER_BLOCK, total)]
@@ -98,7 +98,7 @@ class ShadowMaps(Pass):
 def _lights(inputs: Mapping[str, Description | None]) -> int:
     """How many lights may get a map."""
     lights = inputs["lights"]
-    return lights.records if isinstance(lights, Buffer) and not inputs["rays"] else 1
+    return lights.records if isinstance(lights, Buffer) else 1
 
 
 PASS = ShadowMaps

@@ -1,7 +1,7 @@
-"""Ask by shadow rays which of its share of the VPLs each pixel sees: vpls, G-buffer -> masks.
+"""Ask by shadow rays which lights each pixel sees: vpls, G-buffer -> masks, one bit a VPL of its share; spotlight.
 
 Interleaved, a pixel asks so few VPLs that exact rays can cost less than a map of the whole scene for each. The G-buffer
-is read back, Embree traces on the CPU, and the answers go up as bits.
+is read back, Embree traces on the CPU, and the answers go up. The spotlight is asked, too: no light needs a map.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from deferred_ir.direct_light import on_pixels
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.interleaving import deal, places
 from deferred_ir.io import Io
 from deferred_ir.params import param
 from deferred_ir.ray_visibility import BITS, cost_of_maps, cost_of_rays, masks
-from deferred_ir.surfaces import from_gbuffer
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,13 @@ class Params:
     visibility: Literal["auto", "maps", "rays"] = param(
         "auto", doc="Whether VPLs' shadows come from maps or from rays; auto: from what should take less time."
     )
+    disc_samples: int = param(
+        16, lo=1, hi=64, doc="By rays: points of the spotlight's disc that a pixel asks, where it has a radius."
+    )
 
 
 class ShadowRays(Pass):
-    """Which VPLs of its share a pixel sees."""
+    """Which VPLs of its share a pixel sees, and how the spotlight lights it."""
 
     Params = Params
     inputs: ClassVar[Mapping[str, Input]] = {
@@ -41,12 +44,16 @@ class ShadowRays(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """A layer for each 32 VPLs of a share."""
+        """Masks have a layer for each 32 VPLs of a share."""
         vpls = inputs["vpls"]
         assert isinstance(vpls, Buffer)
         layers = -(-vpls.records // (vpls.parts * BITS))
         doc = "bit b of layer w: whether the pixel sees VPL 32 w + b of its share; in sub-buffers"
-        return {"masks": Output(doc, Texture("r32ui", layers=layers), attach=False)}
+        direct = "irradiance from the spotlight over its emission, shadows included; 0 on the background"
+        return {
+            "masks": Output(doc, Texture("r32ui", layers=layers), attach=False),
+            "spotlight": Output(direct, Texture("r32f"), attach=False),
+        }
 
     def unneeded(self, facts: Facts) -> str | None:
         """Where maps are chosen, or cost less."""
@@ -62,22 +69,19 @@ class ShadowRays(Pass):
     def execute(self, frame: Frame, io: Io) -> None:
         """Read back, trace, upload."""
         vpls, parts = io["vpls"].records, io["vpls"].description.parts
-        scene = frame.scene
-        seen = from_gbuffer(
-            scene.camera,
-            frame.near,
-            io["depth"].read()[..., 0],
-            io["normals"].read(),
-            smooth=scene.geometry.normals is not None,
-        )
-        share, place = places(seen.pixel, frame.size, round(parts**0.5))
-        starts = deal(len(vpls), round(parts**0.5))[1]
+        tracer, seen = frame.tracer(), frame.surfaces(io["depth"], io["normals"])
+        n = round(parts**0.5)
+        share, place = places(seen.pixel, frame.size, n)
+        starts = deal(len(vpls), n)[1]
         shares = [(np.flatnonzero(share == i), slice(int(starts[i]), int(starts[i + 1]))) for i in range(parts)]
-        words, _ = masks(frame.tracer(), seen, vpls, shares)
+        words, _ = masks(tracer, seen, vpls, shares)
         width, height = frame.size
         image = np.zeros((io["masks"].description.layers, height * width), np.uint32)
         image[: len(words), place] = words
         io["masks"].upload(image.reshape(-1, height, width, 1))
+        samples, light = self.params.disc_samples, frame.scene.spotlight
+        direct = on_pixels(tracer, light, seen, frame.size, samples=samples, block=n, seed=frame.seed)
+        io["spotlight"].upload(direct[..., None])
 
 
 PASS = ShadowRays

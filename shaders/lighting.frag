@@ -7,6 +7,9 @@
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 layout(binding = UNIT_ALBEDO) uniform sampler2D albedo;
+#if HAS_SPOTLIGHT
+layout(binding = UNIT_SPOTLIGHT) uniform sampler2D spotlight;
+#endif
 #if HAS_INDIRECT
 layout(binding = UNIT_INDIRECT) uniform sampler2D indirect;
 #if HAS_THIN
@@ -32,9 +35,13 @@ void main() {
     vec4 code = texelFetch(normals, pixel, 0);
     vec3 shading_normal = from_octahedral(code.xy), normal = from_octahedral(code.zw);
     vec3 irradiance = vec3(0.0);
+#if HAS_SPOTLIGHT
+    if (first == 1) irradiance = lights[0].emission * texelFetch(spotlight, pixel, 0).r;
+#else
     if (first == 1)
         irradiance = spot_irradiance(lights[0], position, normal, shading_normal)
                    * SPOT_VISIBILITY(lights[0]);
+#endif
 #if HAS_INDIRECT  // with the near field in it
     irradiance += texelFetch(indirect, pixel, 0).rgb;
 #if HAS_THIN

@@ -107,6 +107,14 @@ def crooked_room() -> Scene:
     return replace(scene, geometry=replace(scene.geometry, positions=scene.geometry.positions + off))
 
 
+def smooth_scene() -> Scene:
+    """A ball with smooth normals between a floor and a ceiling."""
+    ball = sphere(0.5, 2)
+    walls = room()
+    floor = replace(ball, positions=ball.positions + np.array([0.3, -0.4, 0.3]))
+    return build(floor, plane(0.99, -0.99), plane(0.99, 0.95), camera=walls.camera, spotlight=walls.spotlight)
+
+
 def textured(scene: Scene, pixels: Any, uvs: Any) -> Scene:
     """`scene`, whose last material gets an image texture; uvs: (V, 2) of all vertices."""
     geometry = replace(scene.geometry, uvs=np.asarray(uvs, "f4"))

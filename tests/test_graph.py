@@ -68,6 +68,33 @@ def test_what_is_left_out_takes_its_readers_along_up_to_an_optional_input():
     }
 
 
+def replaced(unneeded_because: str | None = None) -> Graph:
+    """Maps that nobody needs where rays tell the same, unless these are left out themselves."""
+    return graph(
+        vertices=source(),
+        pixels=(Fake(unneeded_because=unneeded_because), {}),
+        rays=(Fake(reads("seen")), {"seen": "pixels.out"}),
+        maps=(
+            Fake(reads("x") | reads("rays", optional=True, replaces=True)),
+            {"x": "vertices.out", "rays": "rays.out"},
+        ),
+        light=(Fake(reads("shadows", "rays", optional=True)), {"shadows": "maps.out", "rays": "rays.out"}),
+    )
+
+
+def test_a_pass_is_left_out_where_another_replaces_it():
+    plan = compile(replaced(), ["image"])
+    assert names(plan) == ["pixels", "rays", "light"]
+    assert plan.steps[-1].sources == {"shadows": None, "rays": ("rays", "out")}
+    assert plan.left_out == {"vertices": "no requested output needs it", "maps": "rays makes it needless"}
+
+
+def test_what_is_left_out_replaces_nothing():
+    plan = compile(replaced("the light is off"), ["image"], Facts(emits=False))
+    assert names(plan) == ["vertices", "maps", "light"]
+    assert plan.steps[-1].sources == {"shadows": ("maps", "out"), "rays": None}
+
+
 def test_what_only_left_out_passes_read_is_left_out_too():
     chain = graph(
         vertices=source(),

@@ -6,11 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from small_scenes import build, plane, quad, room, scaled, sphere, textured
 
-from deferred_ir import near_field, vpl_reference
+from deferred_ir import vpl_reference
 from deferred_ir.camera import Camera
 from deferred_ir.lights import Spotlight
 from deferred_ir.near_field import VplLimits, residual
@@ -187,34 +185,6 @@ def test_any_number_of_rays_has_the_same_mean(samples):
 
 
 # The pattern
-
-
-@given(
-    block=st.sampled_from([1, 2, 4, 8]),
-    samples=st.floats(0.25, 16),
-    x=st.integers(0, 40),
-    y=st.integers(0, 40),
-    turn=st.integers(0, 63),
-)
-def test_every_window_of_a_block_has_each_cell_once(block, samples, x, y, turn):
-    columns, rows = np.meshgrid(np.arange(x, x + block), np.arange(y, y + block))
-    traced, index, total = near_field._pattern((rows * 64 + columns).ravel(), 64, samples, block, turn % block**2)
-    np.testing.assert_array_equal(np.sort(index.ravel()), np.arange(total))
-    assert total == len(traced) * index.shape[1]
-    assert total >= max(round(samples * block * block), 1) or samples > 1
-
-
-@pytest.mark.parametrize("count", [1, 2, 3, 7, 16, 64, 256])
-def test_cells_tile_the_square(count):
-    """Where cells overlapped or left gaps, points drawn evenly from all would not be even."""
-    lattice = near_field._lattice(count)
-    steps = lattice[2].astype(float)
-    assert abs(np.linalg.det(steps)) * count == pytest.approx(1, rel=1e-4)
-    each = 160_000 // count
-    points = near_field._points(np.repeat(np.arange(count), each), lattice, np.random.default_rng(3))
-    assert ((points >= 0) & (points < 1)).all()
-    cells, _, _ = np.histogram2d(*points.T, bins=8, range=[[0, 1], [0, 1]])
-    np.testing.assert_allclose(cells, len(points) / 64, rtol=0.12)
 
 
 def test_a_block_errs_less_than_independent_rays_would():

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from fixed_lights import vpl_records
-from small_scenes import build, crooked_room, plane, room, scaled, sphere
+from small_scenes import crooked_room, room, scaled, smooth_scene
 
 from deferred_ir import vpl_reference
 from deferred_ir.path_tracer import PathTracer
@@ -39,13 +37,6 @@ def bits(words, count):
 
 def everything(seen, vpls):
     return [(np.arange(len(seen.pixel)), slice(0, len(vpls)))]
-
-
-def smooth_scene():
-    ball = sphere(0.5, 2)
-    walls = room()
-    floor = replace(ball, positions=ball.positions + np.array([0.3, -0.4, 0.3]))
-    return build(floor, plane(0.99, -0.99), plane(0.99, 0.95), camera=walls.camera, spotlight=walls.spotlight)
 
 
 @pytest.mark.parametrize("scene", [room(), crooked_room(), smooth_scene()])

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from distance import share_off
-from small_scenes import crooked_room, room
+from distance import rel_mse, share_off
+from small_scenes import crooked_room, room, smooth_scene
 
 from deferred_ir import vpl_reference
 from deferred_ir.config import load_graph
@@ -17,7 +17,7 @@ from deferred_ir.path_tracer import PathTracer
 from deferred_ir.vpls import Vpls, cast
 
 SIZE = (50, 38)  # no multiple of 4
-RAYS = {"shadow_rays.visibility": "rays", "vpl.clamp": 0.02}
+RAYS = {"shadow_rays.visibility": "rays", "vpl.clamp": 0.02, "vpl.candidates": 1}
 
 
 def drawn(renderer, scene, vpls, **settings):
@@ -95,12 +95,27 @@ def test_rays_and_maps_make_the_same_picture(renderer):
     assert np.abs(rays - maps).mean() < 0.03 * maps.mean()
 
 
-def test_with_rays_only_the_spotlight_has_a_map(renderer):
+def test_with_rays_no_light_has_a_map(renderer):
     one, plan = drawn(renderer, room(), 64)
-    steps = {step.name: step for step in plan.steps}
-    assert steps["shadow_maps"].outputs["atlas"].description.layers == 1
-    assert one.executor.counters["maps_drawn"] == 1
-    assert len(steps["shadow_maps"].work.subpasses(steps["shadow_maps"].descriptions)) == 1
+    assert plan.left_out["shadow_maps"] == "shadow_rays makes it needless"
+    assert one.executor.counters["maps_drawn"] == 0
+    maps = renderer(SIZE, "accurate", set={"shadow_rays.visibility": "maps"}).plan(room(), 64)
+    assert "shadow_maps" in {step.name for step in maps.steps}
+    dealt_to_all = renderer(SIZE, "accurate", set=RAYS | {"interleave.n": 1}).plan(room(), 64)
+    assert "shadow_maps" in {step.name for step in dealt_to_all.steps}  # there are no shares to ask about
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.3])
+@pytest.mark.parametrize("scene", [crooked_room(), smooth_scene()])
+def test_the_spotlight_is_right_pixel_by_pixel(renderer, scene, radius):
+    scene = replace(scene, spotlight=replace(scene.spotlight, radius=radius))
+    one = renderer(SIZE, "accurate", set=RAYS | {"shadow_rays.disc_samples": 64})
+    found = one.render(scene, vpls=0, accumulate=4 if radius else 1).radiance
+    truth = PathTracer(scene, one.tracer()).direct(SIZE, 256)
+    lit = truth.mean(axis=2) > 0
+    assert 0.05 < lit.mean() < 0.95
+    assert rel_mse(found, truth, np.ones(lit.shape, bool), trim=1e-3) < (1e-3 if radius else 1e-7)
+    assert found[lit].mean() == pytest.approx(truth[lit].mean(), rel=2e-3)
 
 
 @pytest.mark.parametrize("vpls", [0, 1])

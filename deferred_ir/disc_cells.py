@@ -37,8 +37,8 @@ class Cells:
         moved: Array = self.sites[first:] + JITTER * _jitter(1 << len(self.sites).bit_length())[first : len(self.sites)]
         return moved
 
-    def _edges(self) -> tuple[Ints, Array]:
-        """The edges of the cells: the sites on both sides, int (m, 2), and their ends, (m, 2, 2).
+    def _edges(self) -> tuple[Ints, Array, Array]:
+        """The edges of the cells: the sites on both sides, int (m, 2), and their ends, (m, 2, 2); all corners, (k, 2).
 
         Ghosts have numbers below 0. Those between ghosts that have no end are left out.
         """
@@ -46,11 +46,11 @@ class Cells:
         centres = _circumcentres(self._triangles.points[corners])
         triangle, opposite = np.nonzero(neighbours > np.arange(len(corners))[:, None])
         sides = np.stack([corners[triangle, opposite - 2], corners[triangle, opposite - 1]], axis=1) - len(GHOSTS)
-        return sides, np.stack([centres[triangle], centres[neighbours[triangle, opposite]]], axis=1)
+        return sides, np.stack([centres[triangle], centres[neighbours[triangle, opposite]]], axis=1), centres
 
     def shares(self) -> Array:
         """Each site's share of the disc, (n,); they add up to 1."""
-        sides, ends = self._edges()
+        sides, ends, _ = self._edges()
         area = _swept(ends[:, 0], ends[:, 1])
         points = self._triangles.points[sides + len(GHOSTS)]
         # Seen from a site its edges run counter-clockwise.
@@ -70,13 +70,13 @@ class Cells:
             return np.zeros(2), np.inf
         from scipy.spatial import cKDTree
 
-        sides, ends = self._edges()
-        inside = (ends**2).sum(axis=2) <= radius**2
-        leaving = (sides >= 0).all(axis=1) & ~inside.all(axis=1)
+        sides, ends, corners = self._edges()
+        leaving = (sides >= 0).all(axis=1) & ((ends**2).sum(axis=2) > radius**2).any(axis=1)
         length = np.sqrt((self.sites**2).sum(axis=1, keepdims=True))
         opposite = -radius * self.sites / np.where(length > 0, length, 1)
         opposite[length[:, 0] == 0] = radius, 0
-        tried = np.concatenate([ends[inside], _on_circle(ends[leaving, 0], ends[leaving, 1], radius), opposite])
+        rim = np.concatenate([_on_circle(ends[leaving, 0], ends[leaving, 1], radius), opposite])
+        tried = np.concatenate([corners[(corners**2).sum(axis=1) <= radius**2], rim])
         distance = cKDTree(self.sites).query(tried)[0]
         best = int(np.argmax(distance))
         return tried[best], float(distance[best])

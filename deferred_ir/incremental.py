@@ -63,19 +63,9 @@ class IncrementalVpls:
         for _ in free:
             cells.add(self._hole(cells)[0])
         slots = np.concatenate([slots, free])
-        moved: list[int] = []
-        for _ in range(min(least, most) - len(free)):
-            if len(slots) < 2:
-                break
-            row, near = most_crowded(cells.sites)
-            other = Cells(np.delete(cells.sites, row, axis=0))
-            site, far = self._hole(other)
-            if far <= BETTER * near:
-                break
-            other.add(site)
-            cells, slots = other, np.append(np.delete(slots, row), slots[row])
-            moved.append(int(slots[-1]))
-        fresh = np.union1d(free, moved).astype(int)
+        cells, moved = self._spread(cells, min(least, most) - len(free))
+        slots = np.append(np.delete(slots, moved), slots[moved])
+        fresh = np.union1d(free, slots[len(slots) - len(moved) :])
         self.weights[:] = 0
         self.weights[slots] = cells.shares()
         place = np.zeros((len(self.used), 2))
@@ -124,6 +114,30 @@ class IncrementalVpls:
         if not len(cells.sites):
             return unit_disc(self._rng.random((1, 2)))[0] / 2, np.inf
         return cells.emptiest(1 - MARGIN / np.sqrt(len(cells.sites) + 1))
+
+    def _spread(self, cells: Cells, most: int) -> tuple[Cells, list[int]]:
+        """Up to `most` of the most crowded sites put where there is most room, and their rows before; they come last.
+
+        The shortest distance between sites grows or fewer are as close, so with a still light it comes to an end.
+        """
+        count = min(most, len(cells.sites) - 1)
+        while count > 0:
+            left, gone, near, far = np.arange(len(cells.sites)), list[int](), list[float](), list[float]()
+            for _ in range(count):
+                row, distance = most_crowded(cells.sites[left])
+                gone.append(int(left[row]))
+                near.append(distance)
+                left = np.delete(left, row)
+            other = Cells(cells.sites[left])
+            for _ in range(count):
+                site, distance = self._hole(other)
+                other.add(site)
+                far.append(distance)
+            worth = next((i for i in range(count) if far[i] <= BETTER * near[i]), count)
+            if worth == count:
+                return other, gone
+            count = worth
+        return cells, []
 
     def _shoot(self, light: Spotlight, tracer: Tracer, slots: Ints, directions: Array) -> None:
         """Rays along `directions` (m, 3), into `slots`."""

@@ -23,6 +23,7 @@ demo: $(VENV)/installed  ## install, render the Cornell box to out/cornell.png
 
 test: lint types  ## install, check style and types, run all tests
 	@$(BIN)/python tools/system.py opengl
+	@$(BIN)/python tools/system.py display
 	@$(BIN)/python -m pytest
 
 pictures: $(VENV)/installed  ## render the pictures of README and docs again

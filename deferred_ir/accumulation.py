@@ -47,22 +47,31 @@ class Accumulation:
         if "radiance" not in plan.outputs:
             raise GraphError(f"{origin}: has no output 'radiance', which is what frames are averaged in; add it")
         self._source = plan.outputs["radiance"]
-        self._late = readers(plan, self._source)
-        self._early = {step.name for step in plan.steps} - self._late
+        self.follow(plan)
         if plan.outputs.get("display", self._source)[0] in self._early - {self._source[0]}:
             raise GraphError(
                 f"{origin}: outputs.display: is not made of outputs.radiance, so it cannot show the mean of frames; "
                 "ask for .npy or .exr only, or for one frame"
             )
-        self._renderer, self._scene, self._plan, self._seed, self._time = renderer, scene, plan, seed, time
+        self._renderer, self._scene, self._seed, self._time = renderer, scene, seed, time
         self._record, self._parts = record, Record() if record else None
         self._adding_ms = 0.0
         self._sum: tuple[int, Any] = 0, 0.0
+
+    def follow(self, plan: Plan) -> None:
+        """Go on with `plan`, which differs from the one before only in what reads the mean."""
+        self._plan, self._late = plan, readers(plan, self._source)
+        self._early = {step.name for step in plan.steps} - self._late
 
     @property
     def frames(self) -> int:
         """How many frames the mean is of."""
         return self._sum[0]
+
+    @property
+    def total(self) -> Any:
+        """The sum of the frames so far, float64 (H, W, 4), bottom row first; a new array for each frame."""
+        return self._sum[1]
 
     def draw(self) -> None:
         """Draw the next frame and add it. One that is broken off, by Ctrl-C say, has never been."""
@@ -76,6 +85,11 @@ class Accumulation:
 
     def image(self) -> Image:
         """The mean of the frames so far, one at least."""
+        self.show()
+        return self._renderer.read(self._plan)
+
+    def show(self) -> None:
+        """Put the mean in the place of radiance, and run what reads it."""
         done, total = self._sum
         with self._renderer.gpu.ctx:
             self._renderer.executor.resource(self._source).upload(total / done)
@@ -87,7 +101,6 @@ class Accumulation:
             self._parts.laps.insert(-1, {LAP: (self._adding_ms, self._adding_ms)})
             self._record.join(self._parts)
             self._parts, self._adding_ms = Record(), 0.0
-        return self._renderer.read(self._plan)
 
     def _run(self, seed: int, steps: set[str]) -> None:
         self._renderer.draw(self._scene, self._plan, seed=seed, time=self._time, record=self._parts, steps=steps)

@@ -117,6 +117,9 @@ def _parser() -> Parser:
     check = command("check", _check, "Measure whether the renderer can be relied on: so far, shadow maps against rays.")
     _add_check_options(check)
 
+    view = command("view", _view, "Open a window in which camera and light move and the picture follows.")
+    _add_view_options(view)
+
     graph = command("graph", _graph, "Show what a render graph runs, in what order, and what it leaves out.")
     graph.add_argument("graph", metavar="NAME|FILE", help="a built-in graph or a graph file")
     graph.add_argument("--scene", metavar="SCENE", help="plan for this scene")
@@ -163,6 +166,18 @@ def _add_check_options(check: Parser) -> None:
     check.add_argument("--device", default="auto", metavar="D", help="see `deferred-ir devices` (default: auto)")
     check.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
     check.add_argument("--json", metavar="F", help="write all figures")
+
+
+def _add_view_options(view: Parser) -> None:
+    scene_help = "a built-in scene, a scene file (.toml) or a model (default: cornell)"
+    view.add_argument("scene", nargs="?", default="cornell", metavar="SCENE", help=scene_help)
+    view.add_argument("--graph", metavar="NAME|FILE", help="render graph (default: deferred)")
+    view.add_argument("--size", metavar="WxH", help="pixels of the picture, without the panel (default: 512x512)")
+    view.add_argument("--vpls", type=_count, metavar="N", help="virtual point lights (default: 64)")
+    view.add_argument("--seed", type=_count, metavar="N", help="of the samples (default: 0)")
+    view.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
+    view.add_argument("--frames", type=_positive, metavar="N", help="end after N frames")
+    view.add_argument("--screenshot", metavar="OUT.png", help="with --frames: write the window as it is then")
 
 
 def _count(text: str) -> int:
@@ -214,6 +229,12 @@ def _profile(arguments: argparse.Namespace) -> int:
     from .profile_command import run
 
     return run(arguments)
+
+
+def _view(arguments: argparse.Namespace) -> int:
+    from .view_command import run
+
+    return run(arguments, settings(arguments.set))
 
 
 def _check(arguments: argparse.Namespace) -> int:

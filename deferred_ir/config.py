@@ -60,6 +60,20 @@ def load_graph(
 KEYS = ("extends", "outputs", "passes")
 
 
+def graph_files(name: str | Path) -> list[Path]:
+    """The file of the graph `name` and those that it extends; up to the first that cannot be read."""
+    found: list[Path] = []
+    try:
+        path: Path | None = _find(str(name), None)
+        while path and path not in found:
+            found.append(path)
+            base = tomllib.loads(path.read_text(encoding="utf-8")).get("extends")
+            path = _find(base, path.parent) if isinstance(base, str) else None
+    except (GraphError, OSError, ValueError):  # whoever loads the graph says what is wrong
+        return found
+    return found
+
+
 def graph_hash(graph: Graph) -> str:
     """First 16 hex digits of SHA-256 over the wiring and all parameters."""
     nodes = {n.name: [type(n.work).__name__, repr(n.work.params), dict(n.inputs)] for n in graph.nodes.values()}

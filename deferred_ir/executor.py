@@ -73,6 +73,14 @@ class Executor:
         for resource in self._all():
             resource.kept = None
 
+    def reload(self) -> bool:
+        """Read the shader files again; whether one has changed. After a ShaderError the old programs go on."""
+        with self.gpu.ctx:
+            changed = self.library.reload()
+        if changed:
+            self._plan = None  # passes hold the programs that they have used
+        return changed
+
     def memory(self) -> dict[str, int]:
         """Bytes of this executor's textures and buffers."""
         textures = sum(r.nbytes for r in self._all() if isinstance(r, GpuTexture))

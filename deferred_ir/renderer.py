@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from numbers import Integral
@@ -18,6 +18,7 @@ from .accumulation import Accumulation
 from .errors import GraphError, SettingError
 from .executor import Executor
 from .frame import Frame
+from .gl.devices import Loader
 from .gl.gpu import Gpu
 from .gl.scene_buffers import SceneBuffers
 from .gl.timers import Timers
@@ -36,7 +37,7 @@ class Renderer:
 
     size: (width, height) in pixels. graph: a built-in name or a graph file. device: see `deferred-ir devices`.
     set: parameters of passes, {"pass.param": value}. passes: pass classes of your own, {type name: class}, which a
-    graph file then names.
+    graph file then names. window: its context, which is current, instead of a headless one on `device`.
 
     One context, one scene upload: render as often as you like, and close it (or use `with`). It belongs to the thread
     that made it.
@@ -50,6 +51,7 @@ class Renderer:
         *,
         set: Mapping[str, Any] | None = None,
         passes: Mapping[str, type[Pass]] | None = None,
+        window: Loader | None = None,
     ) -> None:
         if not isinstance(size, Sequence) or len(size) != 2 or not all(isinstance(n, Integral) and n > 0 for n in size):
             raise SettingError(f"size {size!r}: wants two whole numbers above 0, width and height")
@@ -58,7 +60,7 @@ class Renderer:
         self._graphs: dict[int | None, Graph] = {}
         self._plans: dict[Any, Plan] = {}
         self.graph(None)  # a fault in the graph shows before a context is made
-        self.gpu = Gpu(device)
+        self.gpu = Gpu(device, window)
         if max(size) > self.gpu.max_size:
             self.gpu.close()
             raise SettingError(f"size {size[0]}x{size[1]}: this driver draws at most {self.gpu.max_size} a side")
@@ -68,6 +70,31 @@ class Renderer:
         self._tracer: Tracer | None = None
         self._scene: Scene | None = None
         self._closed = False
+
+    def configure(
+        self,
+        *,
+        size: tuple[int, int] | None = None,
+        graph: str | Path | None = None,
+        set: Mapping[str, Any] | None = None,
+    ) -> Callable[[], None]:
+        """Change what is named; the rest stays, and so do programs, textures and the scene that are still needed.
+
+        With `graph` or `set` files are read again. After a GraphError nothing has changed. What is returned takes the
+        change back.
+        """
+        names = ("size", "_graph_name", "_set", "_graphs", "_plans")
+        before = {name: getattr(self, name) for name in names}
+        name = self._graph_name if graph is None else graph
+        settings = self._set if set is None else dict(set)
+        own = self.graph(None)
+        if graph is not None or set is not None:
+            own = config.load_graph(name, settings, self._passes)
+        if size is not None:
+            self.size = size
+        self._graph_name, self._set = name, settings
+        self._graphs, self._plans = {None: own}, {}
+        return lambda: self.__dict__.update(before)
 
     def graph(self, vpls: int | None = None) -> Graph:
         """The graph with this number of VPLs, None for its own."""

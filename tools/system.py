@@ -1,4 +1,4 @@
-"""System parts that pip cannot install: `python tools/system.py venv|opengl|browser`.
+"""System parts that pip cannot install: `python tools/system.py venv|opengl|browser|display`.
 
 Looks for the part, installs it by apt-get where that is possible and allowed, else says in one line what to install.
 Runs before anything is installed, so it uses the standard library only (`opengl` runs with deferred-ir in place).
@@ -15,6 +15,7 @@ PACKAGES = {
     "venv": ["python3-venv"],
     "opengl": ["libegl1", "libgl1-mesa-dri"],
     "browser": ["chromium", "fonts-dejavu-core"],
+    "display": ["xvfb", "xdotool", "libgl1"],
 }
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 OPEN_CONTEXT = """
@@ -30,7 +31,18 @@ import shutil
 if not any(map(shutil.which, {BROWSERS})):
     raise SystemExit("no browser for screenshots: none of {", ".join(BROWSERS)} is installed")
 """
-PROBES = {"venv": "import venv, ensurepip", "opengl": OPEN_CONTEXT, "browser": FIND_BROWSER}
+FIND_DISPLAY = """
+import shutil
+for program in ("Xvfb", "xdotool"):
+    if not shutil.which(program):
+        raise SystemExit(f"no virtual display for the viewer's tests: {program} is not installed")
+"""
+PROBES = {
+    "venv": "import venv, ensurepip",
+    "opengl": OPEN_CONTEXT,
+    "browser": FIND_BROWSER,
+    "display": FIND_DISPLAY,
+}
 
 
 def fault(part: str) -> str:

@@ -293,6 +293,20 @@ def _create_default() -> tuple[moderngl.Context, Loader, Device]:
     return context, loader, Device(0, "hardware", name, None, None, "default")
 
 
+def adopt(window: Loader) -> tuple[moderngl.Context, Loader, Device]:
+    """The context of a window, which is current: as `create_context` gives a headless one. DeviceError below 4.3."""
+    import moderngl
+
+    opened: Any = window  # moderngl's annotation knows only dictionaries, its code such objects
+    try:
+        context = moderngl.create_context(context=opened, require=FLOOR)
+    except Exception as error:  # moderngl raises plain Exception
+        raise DeviceError(f"device: no OpenGL 4.3 in the window ({error}); update the graphics driver") from error
+    name = context.info["GL_RENDERER"]
+    kind: Literal["hardware", "software"] = "software" if _SOFTWARE_NAMES.search(name) else "hardware"
+    return _chosen(context, window, Device(0, kind, name, None, None, "window"))
+
+
 def close(context: moderngl.Context, loader: Any) -> None:
     """Destroy a context; unbound first, for EGL keeps one that is current."""
     context.release()

@@ -6,13 +6,19 @@ from functools import cached_property
 from typing import Any
 
 from . import devices, raw
+from .devices import Loader
 
 
 class Gpu:
-    """A context on a device (see devices.create_context), current in the thread that made it. Close it when done."""
+    """A context on a device (see devices.create_context), current in the thread that made it. Close it when done.
 
-    def __init__(self, device: str = "auto") -> None:
-        self.ctx, self._loader, self.device = devices.create_context(device)
+    window: the context of a window, which is current, instead of a headless one; closing leaves it to the window.
+    """
+
+    def __init__(self, device: str = "auto", window: Loader | None = None) -> None:
+        self._headless = window is None
+        opened = devices.create_context(device) if window is None else devices.adopt(window)
+        self.ctx, self._loader, self.device = opened
         self.gl = raw.GL(self._loader)
         extensions = self.ctx.extensions
         self.layer_from_vertex = "GL_ARB_shader_viewport_layer_array" in extensions
@@ -68,8 +74,11 @@ class Gpu:
         self._clipped = count
 
     def close(self) -> None:
-        """Destroy the context and all that lives in it."""
+        """Destroy the context and all that lives in it; a window's own is left to the window."""
         with self.ctx:  # names mean something else in whichever context is current
             for sampler in self._samplers.values():
                 sampler.release()
-        devices.close(self.ctx, self._loader)
+        if self._headless:
+            devices.close(self.ctx, self._loader)
+        else:
+            self.ctx.release()

@@ -39,6 +39,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "MemoryBarrier": (None, _U),
     "PixelStorei": (None, _U, _I),
     "QueryCounter": (None, _U, _U),
+    "ReadPixels": (None, _I, _I, _I, _I, _U, _U, _P),
     "TexStorage2D": (None, _U, _I, _U, _I, _I),
     "TexStorage3D": (None, _U, _I, _U, _I, _I, _I),
     "TexSubImage2D": (None, _U, _I, _I, _I, _I, _I, _U, _U, _P),

@@ -80,7 +80,7 @@ class Program:
         self.gpu, self.name, self.glsl = gpu, name, glsl
         self.arrays: dict[Any, Any] = {}
         members = {member: glsl[member] for member in glsl}
-        self._text = "".join(source.text for source in sources)
+        self.text = "".join(source.text for source in sources)
         self._uniforms = {key: m for key, m in members.items() if type(m).__name__ == "Uniform"}
         self.attributes = [
             key for key, m in members.items() if type(m).__name__ == "Attribute" and not key.startswith("gl_")
@@ -93,7 +93,7 @@ class Program:
             uniform = self._uniforms.get(key)
             if uniform is not None:
                 uniform.value = value
-            elif not re.search(rf"\b{key}\b", self._text):
+            elif not re.search(rf"\b{key}\b", self.text):
                 raise ShaderError(f"{self.name}: no uniform '{key}'{did_you_mean(key, self._uniforms)}")
 
     def has(self, name: str) -> bool:
@@ -137,9 +137,7 @@ class ShaderLibrary:
     def _build(self, files: tuple[str, ...], defines: Mapping[str, Any], folder: Path | None) -> Program:
         import moderngl
 
-        folders = [package_shaders()] if folder is None else [folder, package_shaders()]
-        stages = {"vertex_shader": FULLSCREEN, **{STAGES[Path(file).suffix]: file for file in files}}
-        sources = {stage: flatten(file, folders, defines) for stage, file in stages.items()}
+        sources = _sources(files, defines, folder)
         texts: dict[str, Any] = {stage: source.text for stage, source in sources.items()}
         self.compiled += 1
         try:
@@ -147,6 +145,27 @@ class ShaderLibrary:
         except moderngl.Error as error:
             raise ShaderError(_locate(str(error), sources, files[0])) from error
         return Program(self.gpu, files[0], glsl, sources.values())
+
+    def reload(self) -> bool:
+        """Build the programs again whose files have changed, all or none; whether there were any.
+
+        After a ShaderError the programs are those from before.
+        """
+        fresh: dict[Any, Program] = {}
+        try:
+            for key, program in self._programs.items():
+                files, folder, defines = key
+                sources = _sources(files, dict(defines), folder)
+                if "".join(source.text for source in sources.values()) != program.text:
+                    fresh[key] = self._build(files, dict(defines), folder)
+        except ShaderError:
+            for program in fresh.values():
+                program.release()
+            raise
+        for key, program in fresh.items():
+            self._programs[key].release()
+            self._programs[key] = program
+        return bool(fresh)
 
     def forget(self, key: Any) -> None:
         """Give the vertex arrays back that programs keep for `key`, which is going away."""
@@ -159,6 +178,13 @@ class ShaderLibrary:
         for program in self._programs.values():
             program.release()
         self._programs.clear()
+
+
+def _sources(files: Iterable[str], defines: Mapping[str, Any], folder: Path | None) -> dict[str, Source]:
+    """The flattened shader of each stage."""
+    folders = [package_shaders()] if folder is None else [folder, package_shaders()]
+    stages = {"vertex_shader": FULLSCREEN, **{STAGES[Path(file).suffix]: file for file in files}}
+    return {stage: flatten(file, folders, defines) for stage, file in stages.items()}
 
 
 def _locate(message: str, sources: Mapping[str, Source], name: str) -> str:

@@ -1,0 +1,97 @@
+"""The window's life: take input, change the session, draw the picture and the controls over it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ..gl.resources import GpuTexture
+from ..gl.window import Window
+from ..image import Image
+from .canvas import Area, Canvas
+from .controls import Controls
+from .panel import Panel
+from .session import Session
+from .watch import Watch, is_graph
+
+IDLE = 0.1
+"""Seconds that a frame waits for input where there is nothing to draw."""
+
+
+class Viewer:
+    """A window that shows a session. `frame` is one round of input, drawing and output."""
+
+    def __init__(self, window: Window, session: Session) -> None:
+        self.window, self.session = window, session
+        self.canvas = Canvas(window, session.renderer.gpu, session.renderer.executor.library)
+        self.controls = Controls(window, session)
+        self.panel = Panel(window, session, self.controls)
+        self.watch = Watch()
+        self.frames = 0
+        window.on_drop = self.drop
+
+    def drop(self, paths: list[str]) -> None:
+        """Files dropped on the window: a scene or a model, or a graph file."""
+        for path in paths:
+            if is_graph(path):
+                self.session.choose(path)
+            else:
+                self.session.open(path)
+
+    def area(self) -> Area:
+        """Where in the window the picture is."""
+        width, height = self.window.size
+        return Area(0, 0, max(width - self.panel.width, 1), max(height, 1))
+
+    def frame(self, wait: float = 0.0) -> bool:
+        """One round; whether the picture has changed. Leaves the frame drawn but not yet on screen."""
+        with self.window:
+            self.window.begin(wait)
+            self.controls.take()
+            self.panel.draw(self.area())
+            self._reload()
+            changed = False
+            if not self.window.minimised:
+                area = self.area()
+                self.session.resize((area.width, area.height))
+                changed = self.session.draw()
+                self.window.target()
+                self._picture(area)
+            self.window.end()
+            self.frames += 1
+        return changed
+
+    def _picture(self, area: Area) -> None:
+        texture = self.session.output(self.session.plan.outputs["display"])
+        if not isinstance(texture, GpuTexture):  # nothing was drawn so far
+            return
+        self.canvas.show(texture, area.fitted(texture.size) if texture.size != (area.width, area.height) else area)
+        self.panel.show(self.canvas, area)
+
+    def _reload(self) -> None:
+        if self.watch.changed(self.session.graph, self.session.plan):
+            self.session.change()
+            if not self.session.error:
+                self.session.reload_shaders()
+
+    def screenshot(self) -> Any:
+        """The window as it is, uint8 (H, W, 3)."""
+        with self.window:
+            return self.window.pixels()
+
+    def run(self, frames: int | None = None, screenshot: Path | None = None) -> None:
+        """Until the window is closed, or for `frames` frames; the last one goes to `screenshot`, too."""
+        busy = True
+        while not self.window.closing and (frames is None or self.frames < frames):
+            busy = self.frame(0.0 if busy or frames is not None else IDLE) or self.panel.busy
+            if screenshot and self.frames == frames:
+                Image(None, self.screenshot()).save(screenshot)
+            with self.window:
+                self.window.show()
+
+    def close(self) -> None:
+        """End what runs, and give everything back."""
+        self.panel.close()
+        with self.window:
+            self.session.close()
+        self.window.close()

@@ -1,0 +1,270 @@
+"""What the viewer shows: a scene, its camera and light, a graph with settings, and the Renderer that draws them.
+
+Knows neither window nor controls. A change costs what it must: a frame runs only the passes whose parameters or inputs
+have changed, all of them where scene, camera or light have. Whatever fails leaves the last good picture, and `error`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from ..accumulation import Accumulation, readers
+from ..camera import Camera
+from ..errors import Error, GraphError
+from ..gl.devices import Loader
+from ..graph import Plan, Step
+from ..image import Image
+from ..lights import Spotlight
+from ..loading import load
+from ..motion import FRAMES_PER_SECOND
+from ..options import chosen_settings
+from ..renderer import IMAGES, Renderer
+from ..scene import Scene
+from ..timing import Record
+from .navigation import as_camera
+from .noise import Noise
+
+FRAMES_KEPT = 240
+"""Frame times that are kept for the plot."""
+
+
+class Session:
+    """One scene in one Renderer, on the context of `window`.
+
+    size: (width, height) of the picture. settings: {"pass.param": value}. error: what last went wrong, "" if nothing.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        size: tuple[int, int],
+        window: Loader,
+        *,
+        graph: str = "deferred",
+        settings: Mapping[str, Any] | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.graph, self.settings, self.seed = graph, dict(settings or {}), seed
+        self.renderer = Renderer(size, graph, set=self.settings, window=window)
+        self.error = ""
+        self.progressive = self.playing = self.from_light = False
+        self.accumulation: Accumulation | None = None
+        self.frame_ms: deque[float] = deque(maxlen=FRAMES_KEPT)
+        self.laps: dict[str, tuple[float, float]] = {}
+        self.counters: dict[str, int] = {}
+        self._noise = Noise()
+        self._undo: Callable[[], None] = lambda: None
+        self._stale: set[str] | None = None
+        self._drawn: Plan | None = None
+        self._use(scene)
+        self.plan = self._planned()
+
+    def _use(self, scene: Scene) -> None:
+        self.scene, self.time = scene, 0.0
+        self._place(scene.at(0.0))
+        self.emission = self.spotlight.emission
+
+    def _place(self, scene: Scene) -> None:
+        self.camera = replace(scene.camera, motion=None)
+        self.spotlight = replace(scene.spotlight, motion=None)
+        self.moved()
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture."""
+        return self.renderer.size
+
+    @property
+    def eye(self) -> Camera:
+        """Where the picture is seen from: the camera, or the light."""
+        return as_camera(self.spotlight) if self.from_light else self.camera
+
+    @property
+    def shown(self) -> Scene:
+        """The scene as it is drawn."""
+        return replace(self.scene, camera=self.eye, spotlight=self.spotlight)
+
+    def moved(self) -> None:
+        """Camera, light or scene have changed: all must be drawn again."""
+        self._stale = None
+
+    def look(self, camera: Camera) -> None:
+        """See the scene from `camera`."""
+        self.camera = camera
+        self.moved()
+
+    def shine(self, light: Spotlight) -> None:
+        """Light the scene by `light`."""
+        self.spotlight = light
+        self.moved()
+
+    def open(self, name: str) -> None:
+        """Load another scene, as `deferred-ir view NAME` would: its [render] table counts. The old one stays if not."""
+        before = self.scene
+        try:
+            scene = load(name)
+            self.scene = scene
+            self._configure(scene.render.graph or self.graph, chosen_settings(scene.render, {}, None))
+        except Error as error:
+            self.scene, self.error = before, str(error)
+            return
+        self._use(scene)
+
+    def change(self, graph: str | None = None, settings: Mapping[str, Any] | None = None) -> None:
+        """Take another graph, or other settings, and read the graph's files again; the old ones stay if they fail."""
+        try:
+            self._configure(
+                self.graph if graph is None else graph, dict(self.settings if settings is None else settings)
+            )
+        except Error as error:
+            self.error = str(error)
+
+    def _configure(self, graph: str, settings: dict[str, Any]) -> None:
+        before = self.graph, self.settings, self.plan
+        undo = self.renderer.configure(graph=graph, set=settings)
+
+        def back() -> None:
+            undo()
+            self.graph, self.settings, self.plan = before
+
+        try:
+            self.plan = self._planned()
+        except Error:
+            undo()
+            raise
+        self.graph, self.settings, self.error, self._undo = graph, settings, "", back
+
+    def choose(self, graph: str) -> None:
+        """Take another graph, with those of the settings that it knows."""
+        self.change(graph, {})
+
+    def adjust(self, key: str, value: Any) -> None:
+        """One parameter, "pass.param"."""
+        self.change(settings={**self.settings, key: value})
+
+    def resize(self, size: tuple[int, int]) -> None:
+        """Another size of the picture, at least a pixel."""
+        if size != self.size:
+            self.renderer.configure(size=size)
+            self.plan = self._planned()
+            self.moved()
+
+    def reload_shaders(self) -> None:
+        """Build the programs again whose files have changed; the last good ones stay where that fails."""
+        try:
+            changed = self.renderer.executor.reload()
+        except Error as error:
+            self.error = str(error)
+            return
+        self.error = ""
+        if changed:
+            self.moved()
+
+    def _planned(self) -> Plan:
+        graph = self.renderer.graph()
+        missing = [name for name in ("display", "radiance") if name not in graph.outputs]
+        if missing:
+            raise GraphError(
+                f"{graph.origin}: has no output '{missing[0]}', which a picture needs; add it to [outputs]"
+            )
+        return self.renderer.plan(self.scene_facts, outputs=[name for name in graph.outputs if name in IMAGES])
+
+    @property
+    def scene_facts(self) -> Scene:
+        """The scene whose facts count for the plan: with the light as it is now."""
+        light = self.__dict__.get("spotlight", self.scene.spotlight)
+        return replace(self.scene, spotlight=light)
+
+    def draw(self) -> bool:
+        """Bring the picture up to date; whether there was anything to do."""
+        if self.playing:
+            self.time += 1 / FRAMES_PER_SECOND
+            self._place(self.scene.at(self.time))
+        try:
+            return self._draw()
+        except Error as error:
+            self.error = str(error)
+            self._undo()
+            self._undo, self._drawn, self.accumulation = lambda: None, None, None
+            return False
+
+    def _draw(self) -> bool:
+        self.plan = self._planned()
+        stale = self._stale_steps()
+        if not stale:
+            return self._accumulate()
+        if self.accumulation and stale <= readers(self.plan, self.plan.outputs["radiance"]):
+            self.accumulation.follow(self.plan)
+            self.accumulation.show()
+        else:
+            steps = None if self.accumulation else stale
+            self.accumulation = None
+            record = Record()
+            self.renderer.draw(self.shown, self.plan, seed=self.seed, record=record, steps=steps)
+            self.renderer.finish(record)
+            self._keep(record)
+        self._drawn, self._stale, self._undo = self.plan, set(), lambda: None
+        return True
+
+    def _stale_steps(self) -> set[str]:
+        """The steps that must run again."""
+        if self._stale is None or self._drawn is None:
+            return {step.name for step in self.plan.steps}
+        return changed(self._drawn, self.plan)
+
+    def _accumulate(self) -> bool:
+        """Nothing moves: add a frame to the mean."""
+        if not self.progressive:
+            return False
+        if self.accumulation is None:
+            self.accumulation = Accumulation(self.renderer, self.shown, self.plan, seed=self.seed)
+        self.accumulation.draw()
+        self._noise.add(self.accumulation)
+        self.accumulation.show()
+        return True
+
+    @property
+    def noise_text(self) -> str:
+        """What is known of the mean's error, for the status line."""
+        noise = self._noise.of(self.accumulation) if self.accumulation else None
+        return "" if noise is None else f", relMSE by noise about {noise:.2g}"
+
+    def _keep(self, record: Record) -> None:
+        self.frame_ms += record.frame_ms
+        for laps in record.laps:
+            self.laps |= laps
+        for counters in record.counters:
+            self.counters |= counters
+
+    def output(self, source: tuple[str, str]) -> Any:
+        """The resource that (pass, port) wrote last, None where it has not run yet."""
+        try:
+            return self.renderer.executor.resource(source)
+        except KeyError:
+            return None
+
+    def image(self) -> Image:
+        """The picture on screen."""
+        return self.renderer.read(self.plan)
+
+    def close(self) -> None:
+        """Give back what is on the device."""
+        self.renderer.close()
+
+
+def changed(old: Plan, new: Plan) -> set[str]:
+    """Names of the steps of `new` whose results may differ from those that `old` left behind."""
+    before = {step.name: _identity(step) for step in old.steps}
+    found: set[str] = set()
+    for step in new.steps:
+        fed = any(source and source[0] in found for source in step.sources.values())
+        if fed or before.get(step.name) != _identity(step):
+            found.add(step.name)
+    return found
+
+
+def _identity(step: Step) -> tuple[Any, ...]:
+    return type(step.work), step.work.params, dict(step.sources), dict(step.outputs), dict(step.descriptions)

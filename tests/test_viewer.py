@@ -1,0 +1,186 @@
+"""The viewer in a real window on a virtual display: real keys and mouse, and the pixels of the window."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+from virtual_display import act, display, xdo
+
+from deferred_ir.gl.window import Window
+from deferred_ir.loading import load
+from deferred_ir.renderer import Renderer
+from deferred_ir.viewer.app import Viewer
+from deferred_ir.viewer.panel import WIDTH
+from deferred_ir.viewer.session import Session
+
+SIZE = (128, 96)
+FEW = {"vpl.count": 8}
+
+
+@pytest.fixture(scope="module")
+def screen():
+    with display() as name:
+        yield name
+
+
+@pytest.fixture(scope="module")
+def shared(screen):
+    window = Window("deferred-ir test", (SIZE[0] + WIDTH, SIZE[1]))
+    viewer = Viewer(window, Session(load("cornell"), SIZE, window, settings=FEW))
+    viewer.frame()
+    xdo("search", "--sync", "--name", "deferred-ir test", "windowfocus", "--sync")
+    yield viewer
+    viewer.close()
+
+
+@pytest.fixture
+def viewer(shared):
+    """The window with the Cornell box as it was at first."""
+    session = shared.session
+    session.open("cornell")
+    session.change("deferred", FEW)
+    session.from_light = session.playing = session.progressive = False
+    shared.controls.switches.update(frames=False, map=False, panel=True)
+    shared.window.resize((SIZE[0] + WIDTH, SIZE[1]))
+    xdo("mousemove", 5, 5)
+    act(shared, "mousemove", 20, 20)
+    assert session.size == SIZE
+    assert session.error == ""
+    yield shared
+    with session.renderer.gpu.ctx:
+        assert session.renderer.gpu.ctx.error == "GL_NO_ERROR"
+
+
+def picture(viewer):
+    """The part of the window in which the picture is."""
+    area = viewer.area()
+    return viewer.screenshot()[:, : area.width]
+
+
+def rendered(scene, **options):
+    with Renderer(SIZE, device="software", **options) as renderer:
+        return renderer.render(scene).display
+
+
+def test_the_picture_on_screen_is_the_one_that_render_makes(viewer):
+    expected = rendered(load("cornell"), set=FEW)
+    assert np.array_equal(picture(viewer), expected)
+
+
+def test_the_command_ends_by_itself_and_writes_the_window(screen, tmp_path):
+    command = [sys.executable, "-m", "deferred_ir"]
+    options = ["cornell", "--size", "64x48", "--vpls", "4"]
+    subprocess.run([*command, "view", *options, "--frames", "2", "--screenshot", tmp_path / "w.png"], check=True)
+    subprocess.run([*command, "render", *options, "--device", "software", "-o", tmp_path / "r.png"], check=True)
+    with Image.open(tmp_path / "w.png") as window, Image.open(tmp_path / "r.png") as render:
+        assert window.size == (64 + WIDTH, 48)
+        assert np.array_equal(np.asarray(window)[:, :64], np.asarray(render))
+
+
+def test_without_a_display_it_names_render():
+    environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    command = [sys.executable, "-m", "deferred_ir", "view"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("deferred-ir: view: no display (")
+    assert done.stderr.count("\n") == 1
+    assert "deferred-ir render" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--screenshot", "a.png"], "--screenshot: wants --frames N"),
+        (["--screenshot", "a.jpg", "--frames", "1"], "a.jpg: a screenshot is written as .png"),
+    ],
+)
+def test_options_that_make_no_sense_are_told(options, message):
+    command = [sys.executable, "-m", "deferred_ir", "view", *options]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert message in done.stderr
+
+
+@pytest.mark.parametrize(("key", "scene"), [(2, "atrium"), (3, "colors"), (1, "cornell")])
+def test_number_keys_load_scenes(viewer, key, scene):
+    act(viewer, "key", key)
+    assert viewer.session.scene.name == scene
+    assert viewer.session.error == ""
+
+
+@pytest.mark.parametrize(("key", "axis", "sign"), [("w", 2, 1), ("s", 2, -1), ("d", 0, 1), ("a", 0, -1), ("e", 1, 1)])
+def test_keys_fly_the_camera_along_its_axes(viewer, key, axis, sign):
+    before = viewer.session.camera
+    act(viewer, "keydown", key)
+    act(viewer, "keyup", key)
+    step = before.axes @ np.subtract(viewer.session.camera.position, before.position)
+    assert sign * step[axis] > 0
+    assert np.allclose(np.delete(step, axis), 0)
+    assert np.array_equal(picture(viewer), rendered(replace(load("cornell"), camera=viewer.session.camera), set=FEW))
+
+
+def test_the_mouse_turns_the_camera(viewer):
+    before = viewer.session.camera
+    xdo("mousemove", 40, 40)
+    act(viewer, "mousedown", 1)
+    act(viewer, "mousemove", 60, 40)
+    act(viewer, "mouseup", 1)
+    after = viewer.session.camera
+    assert after.position == before.position
+    right, up, _ = before.axes
+    assert after.axes[2] @ right > 0.05
+    assert abs(after.axes[2] @ up) < 1e-9
+
+
+def test_the_mouse_over_the_panel_leaves_the_camera_alone(viewer):
+    before = viewer.session.camera
+    act(viewer, "mousemove", SIZE[0] + 200, 40)
+    act(viewer, "mousedown", 1)
+    act(viewer, "mousemove", SIZE[0] + 220, 45)
+    act(viewer, "mouseup", 1)
+    assert viewer.session.camera == before
+
+
+def test_a_dropped_scene_is_loaded_and_a_broken_one_leaves_the_picture(viewer, tmp_path):
+    (tmp_path / "broken.toml").write_text("name = 3")
+    before = picture(viewer)
+    viewer.window.on_drop([str(tmp_path / "broken.toml")])
+    viewer.frame()
+    assert "broken.toml" in viewer.session.error
+    assert np.array_equal(picture(viewer), before)
+    viewer.window.on_drop([str(load("colors").path)])
+    viewer.frame()
+    assert viewer.session.scene.name == "colors"
+    assert viewer.session.error == ""
+
+
+def test_a_dropped_graph_is_used(viewer, tmp_path):
+    (tmp_path / "flat.toml").write_text('extends = "deferred"\n[passes.tonemap]\noperator = "none"\n')
+    viewer.window.on_drop([str(tmp_path / "flat.toml")])
+    viewer.frame()
+    assert viewer.session.error == ""
+    assert viewer.session.renderer.graph().nodes["tonemap"].work.params.operator == "none"
+
+
+@pytest.mark.parametrize("size", [(1, 1), (700, 200)])
+def test_the_picture_follows_the_window(viewer, size):
+    viewer.window.resize(size)
+    for _ in range(3):
+        viewer.frame(0.02)
+    assert viewer.window.size == size
+    area = viewer.area()
+    assert viewer.session.size == (area.width, area.height)
+    assert viewer.session.error == ""
+
+
+def test_tab_hides_the_panel_and_the_picture_takes_its_place(viewer):
+    act(viewer, "key", "Tab")
+    assert viewer.session.size == (SIZE[0] + WIDTH, SIZE[1])
+    act(viewer, "key", "Tab")
+    assert viewer.session.size == SIZE

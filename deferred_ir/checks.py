@@ -12,6 +12,20 @@ from .typing import Vec3
 
 LARGEST = 1e18
 """Larger numbers are refused: their squares would overflow 32-bit floats."""
+MOST = 20
+"""Faults that one message lists."""
+
+DEEPEST = 32
+"""Most levels of tables and arrays in a file; Python's own functions on nested values end at some hundreds."""
+
+
+def too_deep(value: Any) -> bool:
+    """Whether tables and arrays in `value` are nested beyond DEEPEST."""
+    level = [value]
+    for _ in range(DEEPEST):
+        tables = [item.values() for item in level if isinstance(item, dict)]
+        level = [inner for items in [*tables, *(item for item in level if isinstance(item, list))] for inner in items]
+    return bool(level)
 
 
 class Faults:
@@ -27,7 +41,8 @@ class Faults:
 
     def fail(self) -> NoReturn:
         """Raise a SceneError with all faults in one line."""
-        faults = " ".join("; ".join(self.found).split())  # a key may hold a line break
+        more = [f"and {len(self.found) - MOST} more"] if len(self.found) > MOST else []
+        faults = " ".join("; ".join(self.found[:MOST] + more).split())  # a key may hold a line break
         raise SceneError(f"{self.file}: {faults}")
 
 
@@ -41,7 +56,9 @@ class Table:
         self.faults, self.name, self.data = faults, name, data
         for key in data:
             if key not in known:
-                self.fault(key, f"unknown key{did_you_mean(key, known)}")
+                # Looking for what was meant takes time, and no more than MOST are shown.
+                hint = did_you_mean(key, known) if len(faults.found) < MOST else ""
+                self.fault(key, f"unknown key{hint}")
 
     def fault(self, key: str, what: str) -> None:
         """Note a fault of `key`."""

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from . import params
+from .checks import DEEPEST, too_deep
 from .errors import GraphError, did_you_mean, shown
 from .graph import Graph, Node, Pass
 
@@ -114,6 +115,8 @@ def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
         raise GraphError(f"{path.name}: cannot be read: {error}") from error
     except (ValueError, RecursionError) as error:  # bad TOML, or too long or too deeply nested for Python
         raise GraphError(f"{path.name}: not TOML: {error}") from error
+    if too_deep(table):
+        raise GraphError(f"{path.name}: tables and arrays nested deeper than {DEEPEST}; flatten them")
     if not isinstance(table.get("passes", {}), dict):
         raise GraphError(f"{path.name}: passes: wants a table [passes.NAME] for each pass")
     if "extends" not in table:

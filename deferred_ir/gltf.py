@@ -7,6 +7,8 @@ cameras go, and what is not honoured becomes a note.
 
 from __future__ import annotations
 
+import base64
+import binascii
 import json
 import struct
 from collections.abc import Iterator
@@ -14,11 +16,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from . import gltf_structure
 from .assets import Assets
-from .errors import SceneError
-
-BINARY = "binary chunk"
-"""Name under which the binary part of a .glb is handed to trimesh."""
+from .errors import SceneError, shown
 
 TRIANGLES, STRIP, FLOAT, REPEAT = 4, 5, 5126, 10497
 HONOURED = {"EXT_texture_webp", "KHR_mesh_quantization"}
@@ -50,28 +50,57 @@ class GltfFile:
     notes: tuple[str, ...]
 
 
-def read(path: Path, data: bytes) -> GltfFile:
-    """Make the .gltf or .glb file `data` at `path` ready for trimesh. Raises SceneError."""
-    blobs = {}
+def read(path: Path, data: bytes, root: Path | None = None) -> GltfFile:
+    """Make the .gltf or .glb file `data` at `path` ready for trimesh. root: see Assets. Raises SceneError."""
+    assets = Assets([path.parent], root=root)
     try:
-        if data[:4] == b"glTF":
-            header, binary = _chunks(data)
-            blobs[BINARY] = binary
-        else:
-            header = data
+        header, binary = _chunks(data) if data[:4] == b"glTF" else (data, None)
         document = json.loads(header.decode("utf-8-sig"))
         if not isinstance(document, dict):
             raise ValueError("not a JSON object")
         notes = tuple(f"{path.name}: {note}" for note in _notes(document))
         _refuse(document)
         materials = _prepare(document)
+        buffers = _buffers(document, binary, assets)
+        gltf_structure.check(document, buffers)
+        for index, buffer in enumerate(buffers):
+            document["buffers"][index] = {"byteLength": len(buffer), "uri": f"buffer {index}"}
+            assets.blobs[f"buffer {index}"] = buffer
     except SceneError as error:
         raise SceneError(f"{path}: {error}") from error
+    except FileNotFoundError as error:
+        raise SceneError(f"{path}: {error}; put it next to the model") from error
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, struct.error) as error:
         # Any of these is what a value of an unexpected kind somewhere in the JSON ends in.
         what = " ".join(f"{type(error).__name__}: {error}".split())
         raise SceneError(f"{path}: malformed glTF ({what}); export it again") from error
-    return GltfFile(json.dumps(document).encode(), Assets([path.parent], blobs), materials, notes)
+    return GltfFile(json.dumps(document).encode(), assets, materials, notes)
+
+
+def _buffers(document: Json, binary: bytes | None, assets: Assets) -> list[bytes]:
+    """The contents of the document's buffers; `binary` is that of the one without a URI. A file is read once."""
+    read: dict[str | None, bytes] = {} if binary is None else {None: binary}
+    buffers = []
+    for index, buffer in enumerate(document.get("buffers", [])):
+        uri = buffer.get("uri")
+        if uri not in read:
+            read[uri] = _content(f"buffers[{index}].uri", uri, assets)
+        if not isinstance(buffer["byteLength"], int) or buffer["byteLength"] > len(read[uri]):
+            what = f"says {shown(buffer['byteLength'])} bytes, but has {len(read[uri])}"
+            raise SceneError(f"buffers[{index}]: {what}; export it again")
+        buffers.append(read[uri])
+    return buffers
+
+
+def _content(where: str, uri: Any, assets: Assets) -> bytes:
+    if not isinstance(uri, str):
+        raise SceneError(f"{where}: must be a name or data, not {shown(uri)}; export it again")
+    if not uri.startswith("data:"):
+        return assets[uri]
+    try:
+        return base64.b64decode(uri.partition(";base64,")[2], validate=True)
+    except binascii.Error as error:
+        raise SceneError(f"{where}: its base64 is broken ({error}); export it again") from error
 
 
 def _chunks(data: bytes) -> tuple[bytes, bytes]:
@@ -172,8 +201,6 @@ def _prepare(document: Json) -> tuple[BaseColor, ...]:
         materials[index] = {"name": str(index), "pbrMetallicRoughness": kept}
     for node in document.get("nodes", []):
         node.pop("camera", None)
-    for buffer in document.get("buffers", []):
-        buffer.setdefault("uri", BINARY)
     if "scenes" not in document:
         nodes = document.get("nodes", [])
         children = {child for node in nodes for child in node.get("children", [])}

@@ -56,7 +56,7 @@ def load(scene: str | os.PathLike[str]) -> Scene:
 def _model(entry: ModelEntry, path: Path, index: int, count: int) -> ModelData:
     """The model of an entry; an error says which entry of which scene file names it."""
     try:
-        return models.read(entry.path, entry.scale, entry.translate)
+        return models.read(entry.path, entry.scale, entry.translate, root=path.parent)
     except SceneError as error:
         if entry.path == path:
             raise

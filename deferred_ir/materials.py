@@ -50,8 +50,34 @@ def checked_albedo(values: Any, where: str, notes: list[str]) -> Vec3:
     return red, green, blue
 
 
+IMAGE_FORMATS = (
+    "PNG",
+    "JPEG",
+    "MPO",
+    "BMP",
+    "TGA",
+    "GIF",
+    "TIFF",
+    "WEBP",
+    "PPM",
+    "DDS",
+    "JPEG2000",
+    "ICO",
+    "PCX",
+    "SGI",
+)
+"""What is read, by PIL's names. Not EPS and the like, for which PIL runs other programs."""
+LARGEST_IMAGE = 1 << 26
+"""Most pixels of an image, 8192x8192: a few hundred bytes can declare any number."""
+
+
 def texture_from_image(image: Any, name: str, notes: list[str]) -> Texture:
-    """A PIL image of any kind as 8-bit RGB. Raises SceneError where its file is broken."""
+    """A PIL image of one of IMAGE_FORMATS as 8-bit RGB. Raises SceneError where its file is broken, or too large."""
+    if image.format is not None and image.format not in IMAGE_FORMATS:
+        raise SceneError(f"{name}: images of format {image.format} are not read; save it as PNG or JPEG")
+    width, height = image.size
+    if width * height > LARGEST_IMAGE:
+        raise SceneError(f"{name}: {width}x{height} pixels, and {LARGEST_IMAGE} are the most; scale it down")
     try:
         image.load()
         pixels = _rgb(image)

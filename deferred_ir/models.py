@@ -18,6 +18,12 @@ from .materials import GREY, checked_albedo, linear_from_srgb, texture_from_imag
 from .scene import Material, Texture
 from .typing import Array, Ints, Vec3
 
+ARCHIVES = ("zip", "gz", "bz2")
+"""trimesh unpacks these without a bound, and reads what is in them without what `gltf` and `obj` mend."""
+
+MOST_TEXELS = 1 << 28
+"""Pixels of all images of a file."""
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -41,38 +47,45 @@ class ModelData:
     notes: tuple[str, ...]
 
 
-def read(path: Path, scale: float = 1.0, translate: Vec3 = (0.0, 0.0, 0.0)) -> ModelData:
+def read(path: Path, scale: float = 1.0, translate: Vec3 = (0.0, 0.0, 0.0), root: Path | None = None) -> ModelData:
     """Read a model file and place it: the file's own transforms, then `scale`, then `translate`.
 
-    Raises SceneError, one line with the file's name, where it is missing, broken, without triangles, or holds vertices
-    that are no numbers.
+    Of the files that it names, those in its own folder and in `root` are read, and none outside. Raises SceneError,
+    one line with the file's name, where it is missing, broken, without triangles, or has vertices that are no numbers.
     """
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise SceneError(f"{path}: is a device or a pipe; give a file")
         data = path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a null character in the name
         what = "is a folder" if path.is_dir() else getattr(error, "strerror", None) or error
         raise SceneError(f"{path}: cannot be read: {what}; check the model's path") from error
-    return _Reader(path, data).read(scale, translate)
+    try:
+        with np.errstate(all="ignore"):  # numbers that overflow on the way are found among the vertices
+            return _Reader(path, data, root).read(scale, translate)
+    except MemoryError as error:
+        raise SceneError(f"{path}: takes more memory than there is; give a smaller model") from error
 
 
 class _Reader:
     """Reads one file; knows what its format needs besides trimesh."""
 
-    def __init__(self, path: Path, data: bytes) -> None:
+    def __init__(self, path: Path, data: bytes, root: Path | None) -> None:
         self.path = path
         self.notes: list[str] = []
         self.mtl: dict[str, obj.MtlMaterial] = {}
         self.base_colors: tuple[gltf.BaseColor, ...] | None = None
         self.textures: dict[int, Texture] = {}
+        self.texels = 0
         self.format = path.name.lower().rpartition(".")[2]
-        self.assets = Assets([path.parent])
+        self.assets = Assets([path.parent], root=root)
         if self.format in ("gltf", "glb"):
-            document = gltf.read(path, data)
+            document = gltf.read(path, data, root)
             data, self.assets, self.base_colors = document.text, document.assets, document.materials
             self.notes += document.notes
             self.format = "gltf"
         elif self.format == "obj":
-            text = obj.read(path, data)
+            text = obj.read(path, data, root)
             data, self.assets, self.mtl = text.text, text.assets, text.materials
             self.notes += text.notes
         self.data = data
@@ -94,6 +107,8 @@ class _Reader:
     def _load(self) -> Any:
         import trimesh
 
+        if self.format in ARCHIVES:
+            raise SceneError(f"{self.path}: is an archive; unpack it and give the model in it")
         with warnings.catch_warnings():
             # numpy 2.3 and older only warn where the text of an OBJ holds something other than numbers.
             warnings.filterwarnings("error", "string or file could not be read", DeprecationWarning)
@@ -101,6 +116,8 @@ class _Reader:
                 return trimesh.load_scene(
                     io.BytesIO(self.data), file_type=self.format, resolver=self.assets, process=False
                 )
+            except MemoryError:
+                raise
             except Exception as error:  # what a broken file makes trimesh raise depends on where it breaks
                 raise SceneError(f"{self.path}: {self._trouble(error)}") from error
 
@@ -129,8 +146,7 @@ class _Reader:
             vertices, faces = vertices[corners], np.arange(len(corners)).reshape(-1, 3)
             normals = None if normals is None else normals[corners]
             uvs, colors = (None if uvs is None else uvs[corners]), np.repeat(colors, 3, axis=0)
-        with np.errstate(all="ignore"):  # NaN and infinity are told of next
-            positions = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        positions = vertices @ matrix[:3, :3].T + matrix[:3, 3]
         self._check(positions)
         linear = matrix[:3, :3] / max(float(np.abs(matrix[:3, :3]).max()), 1e-300)
         if np.linalg.det(linear) < 0:
@@ -169,6 +185,9 @@ class _Reader:
             return Material(name, albedo), None, colors, None
         texture = self.textures.get(id(image))
         if texture is None:
+            self.texels += image.width * image.height
+            if self.texels > MOST_TEXELS:
+                raise SceneError(f"{self.path}: its images have more than {MOST_TEXELS} pixels; scale them down")
             texture = texture_from_image(image, image_name, self.notes)
             self.textures[id(image)] = texture
         return Material(name, albedo), texture, colors, uvs

@@ -36,10 +36,13 @@ class ObjFile:
     notes: tuple[str, ...]
 
 
-def read(path: Path, data: bytes) -> ObjFile:
-    """Make the OBJ file `data` at `path` ready for trimesh; all its material libraries become one."""
+def read(path: Path, data: bytes, root: Path | None = None) -> ObjFile:
+    """Make the OBJ file `data` at `path` ready for trimesh; all its material libraries become one.
+
+    root: see Assets.
+    """
     text = _decoded(data)
-    assets = Assets([path.parent])
+    assets = Assets([path.parent], root=root)
     libraries, notes = [], []
     for names in re.findall(r"^[ \t]*mtllib[ \t]+(.*)", text, re.MULTILINE):
         for name in _library_names(names.strip(), assets):

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from .camera import Camera, view_fault
-from .checks import Faults, Table
+from .checks import DEEPEST, Faults, Table, too_deep
 from .errors import SceneError, did_you_mean, shown
 from .lights import Spotlight
 from .motion import CameraMotion, KeyframedSpotlight, LissajousMotion, ModelMotion, SpotlightMotion
@@ -55,6 +55,8 @@ def read(path: Path) -> SceneFile:
         raise SceneError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:  # bad TOML, bad UTF-8, nested beyond reason
         raise SceneError(f"{path}: not a TOML file: {' '.join(str(error).split())}") from error
+    if too_deep(data):
+        raise SceneError(f"{path}: tables and arrays nested deeper than {DEEPEST}; flatten them")
     root = Table(faults, "", data, ("name", "model", "camera", "spotlight", "render"))
     name = root.string("name")
     if name and not NAME.fullmatch(name):

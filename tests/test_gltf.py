@@ -237,7 +237,7 @@ def test_one_image_of_two_materials_is_one_texture(tmp_path: Path) -> None:
         ({"materials": 3}, "malformed glTF"),
         ({"nodes": [3]}, "malformed glTF"),
         ({"meshes": [{}]}, "malformed glTF (KeyError: 'primitives')"),
-        ({"scenes": [{"nodes": [7]}]}, "broken, or no .gltf file"),
+        ({"scenes": [{"nodes": [7]}]}, "scenes[0].nodes: 7 is none of the 1 that there are; export it again"),
         ({"asset": {"version": "1.0"}}, "only GLTF 2 is supported"),
         ({"scenes": [{"nodes": []}]}, "no triangles"),
     ],

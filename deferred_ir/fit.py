@@ -14,7 +14,7 @@ import numpy as np
 from .camera import Camera
 from .errors import DeviceError
 from .lights import Spotlight
-from .scene import Scene
+from .scene import Scene, moved
 from .typing import Array, Vec3
 
 if TYPE_CHECKING:
@@ -37,39 +37,44 @@ def fitted(scene: Scene, camera: bool, spotlight: bool) -> Scene:
     """`scene` with its camera and its spotlight replaced by chosen ones, as the two flags say; fills Scene.chosen."""
     if not (camera or spotlight):
         return scene
+    near, reasons = _chosen(scene.centred, camera, spotlight)
+    by = scene.geometry.centre
+    views: dict[str, Any] = {"camera": near.camera, "spotlight": near.spotlight}
+    views = {name: moved(views[name], by) if any(by) else views[name] for name in reasons}
+    return replace(scene, **views, chosen={name: _plain(views[name], why) for name, why in reasons.items()})
+
+
+def _chosen(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scene, dict[str, str]]:
+    """The scene, which lies near the origin, with what was chosen, and why each thing was."""
     from .tracing import Tracer
 
     try:
         tracer = Tracer(scene)
     except DeviceError:
         return _fitted_to_bounds(scene, camera, spotlight)
-    chosen: dict[str, Any] = {}
+    reasons: dict[str, str] = {}
     middle = _middle(tracer) if camera else _seen_middle(tracer, scene.camera)
     if camera:
         view = _outside_camera(scene) if middle is None else _inside_camera(tracer, middle)
-        why = "from outside, framing the whole" if middle is None else "inside, looking across"
+        reasons["camera"] = "from outside, framing the whole" if middle is None else "inside, looking across"
         scene = replace(scene, camera=view)
-        chosen["camera"] = _plain(view, why)
     if spotlight:
         lights = [_outside_light(scene)] if middle is None else _room_lights(tracer, scene.camera, middle)
-        light, why = _brightest(tracer, scene.camera, lights)
+        light, reasons["spotlight"] = _brightest(tracer, scene.camera, lights)
         scene = replace(scene, spotlight=light)
-        chosen["spotlight"] = _plain(light, why)
-    return replace(scene, chosen=chosen)
+    return scene, reasons
 
 
-def _fitted_to_bounds(scene: Scene, camera: bool, spotlight: bool) -> Scene:
+def _fitted_to_bounds(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scene, dict[str, str]]:
     """The choice where no rays can be traced."""
-    chosen = {}
+    reasons = {}
     if camera:
-        view = _outside_camera(scene)
-        scene = replace(scene, camera=view)
-        chosen["camera"] = _plain(view, "from outside, framing the whole: without embreex no rays tell what is inside")
+        reasons["camera"] = "from outside, framing the whole: without embreex no rays tell what is inside"
+        scene = replace(scene, camera=_outside_camera(scene))
     if spotlight:
-        light = _lit(_outside_light(scene), _distance_squared(scene))
-        scene = replace(scene, spotlight=light)
-        chosen["spotlight"] = _plain(light, "irradiance of 1 at the middle: without embreex no rays tell what is lit")
-    return replace(scene, chosen=chosen)
+        reasons["spotlight"] = "irradiance of 1 at the middle: without embreex no rays tell what is lit"
+        scene = replace(scene, spotlight=_lit(_outside_light(scene), _distance_squared(scene)))
+    return scene, reasons
 
 
 def _plain(item: Camera | Spotlight, why: str) -> dict[str, Any]:

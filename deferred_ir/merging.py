@@ -47,8 +47,8 @@ def merge(
         uvs=_joined(parts, lambda part: part.uvs, np.zeros(2)),
         colors=_joined(parts, lambda part: part.colors, np.ones(3)),
     )
-    if geometry.diagonal <= 1e-6 * float(np.abs(geometry.bounds).max()):
-        raise SceneError(f"{file}: all vertices lie in one point (to 32-bit floats); scale or move the model")
+    if geometry.diagonal <= 1e-12 * float(np.abs(geometry.bounds).max()):
+        raise SceneError(f"{file}: all vertices lie in one point (to 64-bit floats); scale or move the model")
     ranges, first = [], 0
     for model, motion in models:
         count = sum(len(part.positions) for part in model.parts)

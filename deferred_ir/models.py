@@ -24,6 +24,9 @@ ARCHIVES = ("zip", "gz", "bz2")
 MOST_TEXELS = 1 << 28
 """Pixels of all images of a file."""
 
+FAR_UVS = 16.0
+"""Texture coordinates about a point farther out than this are moved home."""
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -174,6 +177,10 @@ class _Reader:
         if uvs is not None and not np.isfinite(uvs).all():
             self.notes.append(f"{self.path.name}: texture coordinates that are NaN or infinite are taken as 0")
             uvs[~np.isfinite(uvs)] = 0
+        if uvs is not None and len(uvs):
+            # Textures repeat, so whole numbers may go, and 32 bits keep more of the rest.
+            shift = np.round((uvs.min(axis=0) + uvs.max(axis=0)) / 2)
+            uvs -= np.where(np.abs(shift) >= FAR_UVS, shift, 0)
         source = getattr(mesh.visual, "material", None)
         name, albedo, image, image_name = self._reflectance(source, colored=colors is not None)
         if image is not None and uvs is None:

@@ -95,7 +95,7 @@ def reference(
     _check(size, settings, spp=spp, vpls=vpls, bounces=bounces, seed=seed)
     start = time.perf_counter()
     tell: dict[str, Any] = {"scene": scene.name, "scene_hash": scene.hash, "size": list(size), "bounces": bounces}
-    scene = scene.at(0.0)
+    scene = scene.at(0.0).centred
     paths = PathTracer(scene, Tracer(scene), bounces)
     if vpls is None:
         spp = DEFAULT_SPP if spp is None else spp

@@ -155,7 +155,7 @@ class Renderer:
             self._upload(scene)
             assert self._buffers
             start = clock.perf_counter()
-            frame = Frame(self.size, scene.at(time), self._buffers, self.tracer, seed, time)
+            frame = Frame(self.size, scene.at(time).centred, self._buffers, self.tracer, seed, time)
             timers = self._timers if record else None
             with timers.frame() if timers else nullcontext():
                 self.executor.run(plan, frame, timers, steps=steps)
@@ -208,13 +208,13 @@ class Renderer:
             return
         self._forget()
         self.reset()
-        self._buffers, self._scene = SceneBuffers(self.gpu, scene), scene
+        self._buffers, self._scene = SceneBuffers(self.gpu, scene.centred), scene
 
     def tracer(self) -> Tracer:
-        """Embree over the scene drawn last, built when first asked for."""
+        """Embree over the scene drawn last, in the coordinates of `Scene.centred`, built when first asked for."""
         if self._tracer is None:
             assert self._scene, "no scene was drawn yet"
-            self._tracer = Tracer(self._scene)
+            self._tracer = Tracer(self._scene.centred)
         return self._tracer
 
     def _forget(self) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,7 +18,18 @@ from .errors import SceneError
 from .graph import Facts
 from .lights import Spotlight
 from .motion import ModelMotion
-from .typing import Array, Ints
+from .typing import Array, Ints, Vec3
+
+FAR = 4.0
+"""Scenes farther than this many of their diagonals from the origin are moved to it before 32 bits hold them."""
+
+View = TypeVar("View", Camera, Spotlight)
+
+
+def moved(view: View, by: Vec3) -> View:
+    """A camera or a spotlight, at rest, in coordinates that differ by `by`."""
+    (x, y, z), (u, v, w), (a, b, c) = view.position, view.look_at, by
+    return replace(view, position=(x + a, y + b, z + c), look_at=(u + a, v + b, w + c), motion=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +109,18 @@ class Geometry:
         """Length of the bounding box's diagonal."""
         return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
 
+    @cached_property
+    def centre(self) -> Vec3:
+        """Where the origin of 32-bit coordinates lies: the middle of the bounds where they are far off, else 0."""
+        middle = self.bounds.mean(axis=0)
+        x, y, z = middle.tolist() if np.abs(middle).max() > FAR * self.diagonal else (0.0, 0.0, 0.0)
+        return x, y, z
+
+    @cached_property
+    def centred(self) -> Geometry:
+        """The same with `centre` as its origin, subtracted in 64 bits; itself where that is 0."""
+        return replace(self, positions=self.positions - self.centre) if any(self.centre) else self
+
 
 @dataclass(frozen=True)
 class RenderDefaults:
@@ -140,6 +163,23 @@ class Scene:
         motions = tuple(model.motion for model in self.models)
         digest.update(repr((self.materials, self.camera, self.spotlight, motions)).encode())
         return digest.hexdigest()[:16]
+
+    @property
+    def centred(self) -> Scene:
+        """The scene as it stands, near the origin: what the GPU and Embree, which hold 32 bits, are given.
+
+        Itself where it is near already (see Geometry.centre). Camera and light rest where they are.
+        """
+        x, y, z = self.geometry.centre
+        if not (x or y or z):
+            return self
+        by = (-x, -y, -z)
+        return replace(
+            self,
+            geometry=self.geometry.centred,
+            camera=moved(self.camera, by),
+            spotlight=moved(self.spotlight, by),
+        )
 
     @property
     def facts(self) -> Facts:

@@ -108,6 +108,7 @@ def rows(scene: Scene, options: Options, progress: Progress | None = None) -> It
 
     None where the spotlight is dark. Raises GraphError before the first row for settings that do not fit any.
     """
+    scene = scene.centred  # as the maps and Embree have it
     for settings, chosen in _planned(scene, options):
         with Renderer(options.size, GRAPH, options.device, set=settings, passes=PASSES) as renderer:
             for maps in chosen:

@@ -45,7 +45,7 @@ def draw(imgui: Any, session: Session, area: Area, window_height: int) -> None:
     lights = records(session)
     if lights is None:
         return
-    origin = lights["position"].astype(float)
+    origin, centre = lights["position"].astype(float), session.scene.geometry.centre
     axes = np.stack([lights[name] for name in ("x_axis", "y_axis", "z_axis")], axis=1).astype(float)
     axes /= np.maximum(np.linalg.norm(axes, axis=-1, keepdims=True), 1e-30)
     length = np.full(len(lights), LENGTH * session.scene.geometry.diagonal)
@@ -53,7 +53,8 @@ def draw(imgui: Any, session: Session, area: Area, window_height: int) -> None:
     tips = origin[:, None] + axes * length[:, None, None]
     tracer = session.renderer.tracer()
     lifted = tracer.lift(origin, axes[:, 2])
-    hidden = tracer.occluded(np.broadcast_to(np.asarray(session.eye.position, float), lifted.shape), lifted)
+    hidden = tracer.occluded(np.broadcast_to(np.subtract(session.eye.position, centre), lifted.shape), lifted)
+    origin, tips = origin + centre, tips + centre
     start, start_seen = project(origin, session)
     end, end_seen = project(tips.reshape(-1, 3), session)
     end, end_seen = end.reshape(-1, 3, 2), end_seen.reshape(-1, 3)

@@ -76,8 +76,10 @@ class Cells:
         opposite = -radius * self.sites / np.where(length > 0, length, 1)
         opposite[length[:, 0] == 0] = radius, 0
         rim = np.concatenate([_on_circle(ends[leaving, 0], ends[leaving, 1], radius), opposite])
-        tried = np.concatenate([corners[(corners**2).sum(axis=1) <= radius**2], rim])
-        distance = cKDTree(self.sites).query(tried)[0]
+        inside = np.flatnonzero((corners**2).sum(axis=1) <= radius**2)
+        sites = self._triangles.points[self._triangles.simplices[inside, 0]]
+        tried = np.concatenate([corners[inside], rim])
+        distance = np.append(np.linalg.norm(corners[inside] - sites, axis=1), cKDTree(self.sites).query(rim)[0])
         best = int(np.argmax(distance))
         return tried[best], float(distance[best])
 

@@ -36,7 +36,7 @@ MOVING = 12
 """Frames that are measured after them."""
 SEEDS = 3
 PATHS = 256
-FRESH = 64
+FRESH = 16
 """Frames that are averaged for the reference of a moving light: without VPLs' noise, but with their clamp and maps."""
 TIMES = "scene", "redone, ms", "kept, ms", "times faster", "frame, ms", "frame kept, ms", "maps", "most maps"
 ERRORS = "scene", "fresh Sobol set", "kept", "ratio", "flicker, random", "flicker, Sobol", "flicker, kept", "ratio"

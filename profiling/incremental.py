@@ -26,7 +26,7 @@ from deferred_ir.reference import reference
 from deferred_ir.renderer import Renderer
 from deferred_ir.scene import Scene
 from deferred_ir.timing import Record
-from deferred_ir.typing import Array
+from deferred_ir.typing import Array, Bools
 
 VPLS = 256
 MOST = 8
@@ -142,10 +142,10 @@ def flicker(scene: Scene, size: tuple[int, int]) -> dict[str, float]:
     }
 
 
-def _hit(renderer: Renderer) -> Array:
+def _hit(renderer: Renderer) -> Bools:
     """Which pixels show a surface, bool (H, W)."""
     with renderer.gpu.ctx:
-        hit: Array = renderer.executor.resource(("gbuffer", "depth")).read()[::-1, :, 0] > 0
+        hit: Bools = renderer.executor.resource(("gbuffer", "depth")).read()[::-1, :, 0] > 0
     return hit
 
 

@@ -63,7 +63,6 @@ class Gather(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Filter, then light the pixels that it left."""
-        del frame
         gpu, vpls = io.gpu, io["vpls"]
         for unit, name in ((IRRADIANCE, "irradiance"), (THIN, "thin"), (COUNT, "count"), (MISSING, "missing")):
             io[name].bind_image(unit)
@@ -71,7 +70,11 @@ class Gather(Pass):
         angle, shares = radians(self.params.angle), io.defines["INTERLEAVE"] ** 2
         program = io.program("gather.frag")
         program.set(
-            cosine_squared=cos(angle) ** 2, sine_squared=sin(angle / 2) ** 2, fewest=self.params.fewest * shares
+            cosine_squared=cos(angle) ** 2,
+            sine_squared=sin(angle / 2) ** 2,
+            fewest=self.params.fewest * shares,
+            # An even window is off centre: in frames with fresh seeds to all sides, so that their mean is not.
+            side=(frame.seed & 1, frame.seed >> 1 & 1),
         )
         program.draw_fullscreen()
         if io["rays"]:

@@ -2,8 +2,9 @@
 
     python -m deferred_ir.profiling.convergence cornell -o out/convergence --graphs deferred,accurate --vpls 256
 
-The folder may be one of `deferred-ir profile`: its reference, mask and points of peers are taken, and those that are
-missing are made. Errors are of the pixels without an edge inside, as in the tables of equal error.
+A graph may have settings, as in `accurate:interleave.n=1`. The folder may be one of `deferred-ir profile`: its
+reference, mask and points of peers are taken, and those that are missing are made. Errors are of the pixels without an
+edge inside, as in the tables of equal error.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 from tqdm import tqdm
 
 from deferred_ir.accumulation import Accumulation
+from deferred_ir.cli import settings as settings_of
 from deferred_ir.errors import Error
 from deferred_ir.loading import load
 from deferred_ir.metrics import masked_relmse
@@ -38,7 +40,8 @@ Line = list[tuple[int, float, float]]
 def line(scene: Scene, graph: str, *, size: tuple[int, int], vpls: int, truth: Truth, mask: Mask) -> Line:
     """Time and error after 1, 4, 16 and 64 frames."""
     found: Line = []
-    with Renderer(size, graph) as renderer:
+    name, settings = _parsed(graph)
+    with Renderer(size, name, set=settings) as renderer:
         plan = renderer.plan(scene, vpls, ["radiance"])
         renderer.draw(scene, plan, seed=1)  # compiles, allocates: not what a frame costs
         mean = Accumulation(renderer, scene, plan)
@@ -51,6 +54,12 @@ def line(scene: Scene, graph: str, *, size: tuple[int, int], vpls: int, truth: T
                 error = masked_relmse(mean.image().radiance, truth.radiance, mask.kept)
                 found.append((frame, spent * 1e3, float("nan") if error is None else error))
     return found
+
+
+def _parsed(graph: str) -> tuple[str, dict[str, Any]]:
+    """Name and settings of `name:pass.parameter=value:...`."""
+    name, *settings = graph.split(":")
+    return name, settings_of(settings)
 
 
 def plot(title: str, lines: dict[str, Line], peers: Sequence[Rung], path: Path) -> None:
@@ -108,7 +117,8 @@ def report(chosen: argparse.Namespace, scene: Scene) -> None:
     else:
         images: list[Any] = []
         for graph in chosen.graphs:
-            with Renderer(size, graph) as renderer:
+            name, settings = _parsed(graph)
+            with Renderer(size, name, set=settings) as renderer:
                 images.append(renderer.render(scene, vpls=chosen.vpls, accumulate=FRAMES[-1]).radiance)
         sweep = {"convergence": chosen.graphs}
         with bars() as bar:

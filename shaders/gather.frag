@@ -13,6 +13,7 @@ layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
 uniform float cosine_squared;  // of the largest angle between normals, at most 90 degrees
 uniform float sine_squared;    // of the largest angle off the pixel's plane
 uniform float fewest;          // neighbours
+uniform ivec2 side;            // 0 or 1: where the window has a pixel more, before the centre or behind it
 
 in vec2 ndc;
 layout(location = 0) out vec4 irradiance;
@@ -55,9 +56,8 @@ void main() {
     c.across = frame.ray[0].xyz * (2.0 / float(c.size.x));
     c.up = frame.ray[1].xyz * (2.0 / float(c.size.y));
     c.ray = frame.ray[0].xyz * ndc.x + frame.ray[1].xyz * ndc.y + frame.ray[2].xyz;
-    // N/2 pixels before the centre and one less behind it; at the image's border the window moves inwards, so that it
-    // has every share.
-    ivec2 corner = clamp(c.pixel - N / 2, ivec2(0), max(c.size - N, 0));
+    // At the image's border the window moves inwards, so that it has every share.
+    ivec2 corner = clamp(c.pixel - N / 2 + side, ivec2(0), max(c.size - N, 0));
     vec4 sum = vec4(0.0);
     uvec2 found = uvec2(0u);  // a bit for each share
     for (int y = 0; y < N; ++y)

@@ -108,7 +108,8 @@ def gathered(scene, n, fewest, shares, gbuffer):
         return to + n if to < centre else to - n
 
     for y, x in np.argwhere(depth > 0):
-        left, low = (min(max(c - n // 2, 0), max(length - n, 0)) for c, length in ((x, width), (y, height)))
+        left = min(max(x - n // 2 + 1, 0), max(width - n, 0))  # the seed is 1
+        low = min(max(y - n // 2, 0), max(height - n, 0))
         window = [(i, j) for j in range(low, low + n) for i in range(left, left + n)]
         found = [neighbour(x, y, i, j) for i, j in window]
         if sum(value is not None for value in found) <= fewest * n * n:  # one at least is missing

@@ -102,7 +102,8 @@ class Tracer:
         parts = self._map(
             lambda chunk: self._embree.run(org[chunk], dirs[chunk], dists=tfar[chunk].copy(), output=1), len(org)
         )
-        face, u, v = (np.concatenate([part[name] for part in parts]) for name in ("primID", "u", "v"))
+        none = [np.zeros(0, np.int32)]
+        face, u, v = (np.concatenate([part[name] for part in parts] or none) for name in ("primID", "u", "v"))
         rows = np.flatnonzero(face >= 0)
         u, v = u[rows].astype(np.float64), v[rows].astype(np.float64)
         weights = np.stack([1 - u - v, u, v], axis=-1)

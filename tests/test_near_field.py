@@ -222,6 +222,15 @@ def test_the_background_and_no_clamp_have_no_residual():
     assert not residual(tracer, ball.spotlight, nothing, SIZE, VplLimits(0.5), samples=0.25, block=4).any()
 
 
+def test_where_no_ray_meets_anything_further_bounces_bring_nothing():
+    floor = build(plane(), camera=Camera((0.0, 2.0, 0.1), (0.0, 0.0, 0.0)))
+    tracer = Tracer(floor)
+    seen, _ = seen_by(floor, tracer)
+    image = residual(tracer, floor.spotlight, seen, SIZE, VplLimits(0.5), samples=1, block=4, bounces=3)
+    assert (image[..., 3] == 1).any()
+    assert (image[..., :3] == 0).all()
+
+
 def test_faces_twice_at_the_same_place_change_nothing():
     scene = room()
     geometry = scene.geometry

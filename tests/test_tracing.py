@@ -52,6 +52,8 @@ def test_no_rays_at_all():
     tracer, none = Tracer(build(plane())), np.zeros((0, 3))
     hits = tracer.closest(none, none)
     assert (hits.position.shape, hits.face.shape, tracer.occluded(none, none).shape) == ((0, 3), (0,), (0,))
+    rows, near = tracer.within(none, none, 1.0)
+    assert (rows.shape, near.position.shape) == ((0,), (0, 3))
 
 
 def test_from_inside_a_box_every_ray_meets_the_wall_it_points_at():

@@ -81,6 +81,7 @@ class Gather(Pass):
             gpu.barrier()
             return
         program = io.program("thin.frag", "thin.vert")
+        gpu.clip(1)  # to the rows that the list fills
         gpu.gl.ColorMask(0, 0, 0, 0)  # the shader stores where each pixel belongs
         for start in range(0, len(vpls.records), vpls.description.block):
             gpu.barrier()

@@ -207,6 +207,20 @@ def test_more_vpls_in_a_share_than_in_a_block_of_the_buffer(renderer):
     assert shared.mean() == pytest.approx(full.mean(), rel=1e-2)
 
 
+def test_it_goes_without_shadow_maps(renderer, tmp_path):
+    """What the filter uploads for its list stays out of the way of the textures that it reads."""
+    readers, images = {"deferred": ("lighting",), "interleaved": ("lighting", "gather", "interleaved")}, []
+    for name, passes in readers.items():
+        wires = [f"[passes.{reader}.inputs]\nshadows = false" for reader in passes]
+        text = [f'extends = "{name}"', "[passes]", "shadow_maps = false", *wires]
+        text[3] += "\nblockers = false"
+        (tmp_path / f"{name}.toml").write_text("\n".join(text))
+        images.append(renderer((64, 48), tmp_path / f"{name}.toml").render(crooked_room(), vpls=64).radiance)
+    full, shared = images
+    assert rel_mse(shared, full, np.ones(full.shape[:2], bool), trim=1e-3) < 0.01
+    assert shared.mean() == pytest.approx(full.mean(), rel=1e-2)
+
+
 def leaves(count):
     """Small triangles in all directions, so many that nearly every pixel has an edge beside it."""
     rng = np.random.default_rng(2)

@@ -64,8 +64,10 @@ class Gpu:
         self.gl.ColorMask(1, 1, 1, 1)
 
     def barrier(self) -> None:
-        """Let later draws see what shaders stored into images so far."""
-        self.gl.MemoryBarrier(raw.IMAGE_ACCESS_BARRIER | raw.TEXTURE_FETCH_BARRIER)
+        """Let later draws, uploads and reads see what shaders stored into images so far."""
+        self.gl.MemoryBarrier(
+            raw.IMAGE_ACCESS_BARRIER | raw.TEXTURE_FETCH_BARRIER | raw.TEXTURE_UPDATE_BARRIER | raw.FRAMEBUFFER_BARRIER
+        )
 
     def clip(self, count: int) -> None:
         """Clip by the first `count` of gl_ClipDistance, and by no other."""

@@ -46,6 +46,9 @@ FORMATS = {
 }
 """Formats by the names that ports use; `rgba16` and `rgba8` are normalised integers."""
 
+SCRATCH_UNIT = 31
+"""Texture unit in which textures are filled and read, so that those bound for a pass stay: their units end at 15."""
+
 
 class GpuTexture:
     """An immutable 2D texture or array of one level. `size` is (width, height).
@@ -62,7 +65,7 @@ class GpuTexture:
         self.target = raw.TEXTURE_2D_ARRAY if description.layers else raw.TEXTURE_2D
         gl = gpu.gl
         self.glo = gl.make("GenTextures")
-        gl.BindTexture(self.target, self.glo)
+        self._bind_to_work()
         if description.layers:
             gl.TexStorage3D(self.target, 1, self.format.internal, *size, description.layers)
         else:
@@ -76,13 +79,18 @@ class GpuTexture:
     def upload(self, pixels: Any) -> None:
         """Fill it from (H, W, channels) or (layers, H, W, channels), bottom row first, in the format's dtype."""
         gl, data = self.gpu.gl, np.ascontiguousarray(pixels, self.format.dtype)
-        gl.BindTexture(self.target, self.glo)
+        self._bind_to_work()
         gl.PixelStorei(0x0CF5, 1)  # UNPACK_ALIGNMENT
         source = self.format.layout, self.format.type, data.ctypes.data_as(ctypes.c_void_p)
         if self.description.layers:
             gl.TexSubImage3D(self.target, 0, 0, 0, 0, *self.size, self.description.layers, *source)
         else:
             gl.TexSubImage2D(self.target, 0, 0, 0, *self.size, *source)
+
+    def _bind_to_work(self) -> None:
+        """Make it the texture that OpenGL's functions for textures act on."""
+        self.gpu.gl.ActiveTexture(raw.TEXTURE0 + SCRATCH_UNIT)
+        self.gpu.gl.BindTexture(self.target, self.glo)
 
     def bind(self, unit: int, sampler: Any) -> None:
         """Make it readable through texture `unit` with a moderngl sampler."""
@@ -99,7 +107,7 @@ class GpuTexture:
         layers = (self.description.layers,) if self.description.layers else ()
         pixels = np.empty((*layers, self.size[1], self.size[0], self.format.channels), self.format.dtype)
         gl = self.gpu.gl
-        gl.BindTexture(self.target, self.glo)
+        self._bind_to_work()
         gl.PixelStorei(0x0D05, 1)  # PACK_ALIGNMENT
         gl.GetTexImage(self.target, 0, self.format.layout, self.format.type, pixels.ctypes.data_as(ctypes.c_void_p))
         gl.check(f"reading {self.description}")

@@ -17,7 +17,7 @@ from deferred_ir.graph import Description, Input, Output, Pass, Texture
 from deferred_ir.interleaving import deal
 from deferred_ir.io import Io
 from deferred_ir.parallel import in_order
-from deferred_ir.surfaces import Surfaces, from_gbuffer
+from deferred_ir.surfaces import Surfaces
 from deferred_ir.tracing import Hits, Tracer
 from deferred_ir.typing import Array, Ints
 from deferred_ir.vpl_reference import Lights, Patch
@@ -45,15 +45,15 @@ class ThinRays(Pass):
     def execute(self, frame: Frame, io: Io) -> None:
         """Read back, trace, upload."""
         width, height = frame.size
-        vpls, parts, scene, tracer = io["vpls"].records, io["vpls"].description.parts, frame.scene, frame.tracer()
+        vpls, parts = io["vpls"].records, io["vpls"].description.parts
         count = int(io["count"].read()[0, 0, 0])
         bits = np.zeros((height * width, 2), np.uint32)
         bits[io["thin"].read().reshape(-1)[:count]] = io["missing"].read().reshape(-1, 2)[:count]
-        chosen = bits.any(axis=1).reshape(height, width)
-        seen = from_gbuffer(scene.camera, frame.near, io["depth"].read()[..., 0] * chosen, io["normals"].read())
+        seen = frame.surfaces(io["depth"], io["normals"])
+        asking = seen.rows(np.flatnonzero(bits[seen.pixel].any(axis=1)))
         image = np.zeros((height * width, 4), np.float32)
-        if len(vpls) and len(seen.pixel):
-            image[seen.pixel, :3] = _irradiance(tracer, seen, vpls, bits[seen.pixel], parts)
+        if len(vpls) and len(asking.pixel):
+            image[asking.pixel, :3] = _irradiance(frame.tracer(), asking, vpls, bits[asking.pixel], parts)
         io["irradiance"].upload(image.reshape(height, width, 4))
 
 

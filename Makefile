@@ -26,7 +26,8 @@ test: lint types  ## install, check style and types, run all tests
 	@$(BIN)/python tools/system.py display
 	@$(BIN)/python -m pytest
 
-pictures: $(VENV)/installed  ## render the pictures of README and docs again
+pictures: $(VENV)/installed-dev  ## render the pictures of README and docs again
+	@$(BIN)/python tools/system.py display
 	@$(BIN)/python tools/pictures.py
 
 bench: $(VENV)/installed  ## measure how far from the limits the passes are, for docs/bench.md

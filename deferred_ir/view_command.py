@@ -34,6 +34,7 @@ def run(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
     width, height = chosen_size(arguments.size, defaults)
     window = Window("deferred-ir", (width + WIDTH, height))
     try:
+        window.resize((width + round(WIDTH * window.scale), height))
         session = Session(
             scene,
             (width, height),

@@ -52,3 +52,55 @@ def renderer() -> Iterator[Callable[..., Renderer]]:
     for one in made:
         clean(one)
         one.close()
+
+
+@pytest.fixture(scope="module")
+def screen() -> Iterator[str]:
+    """A virtual display."""
+    from virtual_display import display
+
+    with display() as name:
+        yield name
+
+
+@pytest.fixture(scope="module")
+def viewer_window(screen: str) -> Iterator[Any]:
+    """One window for all tests of a file."""
+    from virtual_display import FEW, SIZE, xdo
+
+    from deferred_ir.gl.window import Window
+    from deferred_ir.loading import load
+    from deferred_ir.viewer.app import Viewer
+    from deferred_ir.viewer.panel import WIDTH
+    from deferred_ir.viewer.session import Session
+
+    del screen
+    window = Window("deferred-ir test", (SIZE[0] + WIDTH, SIZE[1]))
+    viewer = Viewer(window, Session(load("cornell"), SIZE, window, settings=FEW))
+    viewer.frame()
+    xdo("search", "--sync", "--name", "deferred-ir test", "windowfocus", "--sync")
+    yield viewer
+    viewer.close()
+
+
+@pytest.fixture
+def viewer(viewer_window: Any) -> Iterator[Any]:
+    """The window with the Cornell box as it was at first."""
+    from virtual_display import FEW, SIZE, act, xdo
+
+    from deferred_ir.viewer.panel import WIDTH
+
+    shared = viewer_window
+    session = shared.session
+    session.open("cornell")
+    session.change("deferred", FEW)
+    session.from_light = session.playing = session.progressive = False
+    shared.controls.switches.update(frames=False, map=False, panel=True)
+    shared.window.resize((SIZE[0] + WIDTH, SIZE[1]))
+    xdo("mousemove", 5, 5)
+    act(shared, "mousemove", 20, 20)
+    assert session.size == SIZE
+    assert session.error == ""
+    yield shared
+    with session.renderer.gpu.ctx:
+        assert session.renderer.gpu.ctx.error == "GL_NO_ERROR"

@@ -10,62 +10,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-from virtual_display import act, display, xdo
+from virtual_display import FEW, SIZE, act, picture, rendered, xdo
 
-from deferred_ir.gl.window import Window
 from deferred_ir.loading import load
-from deferred_ir.renderer import Renderer
-from deferred_ir.viewer.app import Viewer
 from deferred_ir.viewer.panel import WIDTH
-from deferred_ir.viewer.session import Session
-
-SIZE = (128, 96)
-FEW = {"vpl.count": 8}
-
-
-@pytest.fixture(scope="module")
-def screen():
-    with display() as name:
-        yield name
-
-
-@pytest.fixture(scope="module")
-def shared(screen):
-    window = Window("deferred-ir test", (SIZE[0] + WIDTH, SIZE[1]))
-    viewer = Viewer(window, Session(load("cornell"), SIZE, window, settings=FEW))
-    viewer.frame()
-    xdo("search", "--sync", "--name", "deferred-ir test", "windowfocus", "--sync")
-    yield viewer
-    viewer.close()
-
-
-@pytest.fixture
-def viewer(shared):
-    """The window with the Cornell box as it was at first."""
-    session = shared.session
-    session.open("cornell")
-    session.change("deferred", FEW)
-    session.from_light = session.playing = session.progressive = False
-    shared.controls.switches.update(frames=False, map=False, panel=True)
-    shared.window.resize((SIZE[0] + WIDTH, SIZE[1]))
-    xdo("mousemove", 5, 5)
-    act(shared, "mousemove", 20, 20)
-    assert session.size == SIZE
-    assert session.error == ""
-    yield shared
-    with session.renderer.gpu.ctx:
-        assert session.renderer.gpu.ctx.error == "GL_NO_ERROR"
-
-
-def picture(viewer):
-    """The part of the window in which the picture is."""
-    area = viewer.area()
-    return viewer.screenshot()[:, : area.width]
-
-
-def rendered(scene, **options):
-    with Renderer(SIZE, device="software", **options) as renderer:
-        return renderer.render(scene).display
 
 
 def test_the_picture_on_screen_is_the_one_that_render_makes(viewer):

@@ -1,4 +1,4 @@
-"""A virtual display with real key and mouse events, for tests of the viewer."""
+"""A virtual display with real key and mouse events, and what tests of the viewer ask it for."""
 
 from __future__ import annotations
 
@@ -6,10 +6,16 @@ import os
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
+from deferred_ir.renderer import Renderer
+from deferred_ir.scene import Scene
 from deferred_ir.viewer.app import Viewer
 
-SCREEN = "1400x1000x24"
+SCREEN = "1700x1000x24"
+SIZE = (128, 96)
+"""Of the picture."""
+FEW = {"vpl.count": 8}
 
 
 @contextmanager
@@ -38,7 +44,7 @@ def display() -> Iterator[str]:
 
 def xdo(*words: object) -> None:
     """One command of xdotool."""
-    subprocess.run(["xdotool", *map(str, words)], check=True, timeout=20)
+    subprocess.run(["xdotool", *map(str, words)], check=True)
 
 
 def act(viewer: Viewer, *words: object, frames: int = 4) -> None:
@@ -48,3 +54,21 @@ def act(viewer: Viewer, *words: object, frames: int = 4) -> None:
         viewer.frame(0.02)
         with viewer.window:
             viewer.window.show()
+
+
+def picture(viewer: Viewer) -> Any:
+    """The part of the window in which the picture is."""
+    area = viewer.area()
+    return viewer.screenshot()[:, : area.width]
+
+
+def rendered(scene: Scene, **options: Any) -> Any:
+    """Display pixels without a window."""
+    with Renderer(SIZE, device="software", **options) as renderer:
+        return renderer.render(scene).display
+
+
+def frames(viewer: Viewer, count: int = 4) -> None:
+    """Some frames without input."""
+    for _ in range(count):
+        viewer.frame(0.02)

@@ -1,7 +1,8 @@
 """Renders every picture of README and docs: `python tools/pictures.py [NAME.png ...]`, or `make pictures`.
 
 The commands are those that the pages show, besides those of the built-in scenes; the worked example of
-docs/adding-a-pass.md makes a picture of its own. (The plots are made by the commands that docs/accuracy.md names.)
+docs/adding-a-pass.md makes a picture of its own, and so does the viewer. (The plots are made by the commands that
+docs/accuracy.md names.)
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import viewer_picture
 from pages import PICTURES, ROOT, blocks, picture_commands
 
 SCENES = {
@@ -23,6 +25,7 @@ SCENES = {
 """The pictures at the top of the README."""
 EXAMPLE = ROOT / "docs" / "adding-a-pass.md"
 EXAMPLE_PICTURE = "false_color.png"
+VIEWER_PICTURE = "viewer.png"
 
 
 def write_example(folder: Path) -> str:
@@ -44,7 +47,7 @@ def run_example(target: Path) -> None:
 def main(wanted: list[str]) -> int:
     """Make all pictures, or those that are named."""
     made = SCENES | picture_commands()
-    known = [*made, EXAMPLE_PICTURE]
+    known = [*made, EXAMPLE_PICTURE, VIEWER_PICTURE]
     if unknown := set(wanted) - set(known):
         print(f"no such picture: {', '.join(sorted(unknown))}; known: {', '.join(sorted(known))}", file=sys.stderr)
         return 2
@@ -53,6 +56,9 @@ def main(wanted: list[str]) -> int:
         if name in made:
             print(" ".join(made[name]), flush=True)
             subprocess.run([sys.executable, "-m", "deferred_ir", *made[name][1:]], cwd=ROOT, check=True)
+        elif name == VIEWER_PICTURE:
+            print(f"the viewer: {name}", flush=True)
+            viewer_picture.main(str(ROOT / PICTURES / name))
         else:
             print(f"{EXAMPLE.name}: {name}", flush=True)
             run_example(ROOT / PICTURES / name)

@@ -103,10 +103,12 @@ class Window:
 
     def viewport(self, x: int, y: int, width: int, height: int) -> None:
         """Draw into this part of the window, from its lower left corner."""
+        self.gl.BindFramebuffer(raw.FRAMEBUFFER, 0)
         self.gl.Viewport(x, y, width, height)
 
     def end(self) -> None:
         """Draw the controls over what is there."""
+        self.viewport(0, 0, *self.size)
         self._imgui.render()
         self._imgui.backends.opengl3_render_draw_data(self._imgui.get_draw_data())
 

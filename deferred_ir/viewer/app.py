@@ -57,6 +57,7 @@ class Viewer:
                 changed = self.session.draw()
                 self.window.target()
                 self._picture(area)
+                self.panel.finish()
             self.window.end()
             self.frames += 1
         return changed
@@ -91,7 +92,7 @@ class Viewer:
 
     def close(self) -> None:
         """End what runs, and give everything back."""
-        self.panel.close()
         with self.window:
+            self.panel.close()
             self.session.close()
         self.window.close()

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from ..config import graph_names
+from ..errors import Error
 from ..gl.window import Window
 from ..loading import builtin_scenes
 from ..params import specs
@@ -16,11 +18,15 @@ from .controls import HELP, Controls
 from .maps_panel import MapsPanel
 from .parameters import widget
 from .passes_panel import PassesPanel
+from .saving import save
 from .session import Session
+from .truth_panel import TruthPanel
 
 WIDTH = 380
 """Of the panel, pixels at 96 dots an inch."""
 BRIGHTEST = 100.0
+FOLDER = Path()
+"""Where pictures are saved: the working folder."""
 
 
 class Panel:
@@ -33,6 +39,8 @@ class Panel:
         self._window, self._session, self._controls = window, session, controls
         self.passes = PassesPanel(imgui, session)
         self.maps = MapsPanel(imgui, session, controls)
+        self.truth = TruthPanel(imgui, session)
+        self.saved = ""
         self._scenes = [name for name, _ in builtin_scenes()]
 
     @property
@@ -45,7 +53,8 @@ class Panel:
     @property
     def busy(self) -> bool:
         """Whether the next frame will differ by itself."""
-        return self._session.playing or self._session.progressive
+        session = self._session
+        return session.playing or session.progressive or session.recording or self.truth.truth.running
 
     def draw(self, area: Area) -> None:
         """All controls of this frame, and what lies over the picture in `area`."""
@@ -65,7 +74,9 @@ class Panel:
             ("Light", self._light, True),
             ("Passes", self.passes.draw, True),
             ("Parameters", self._parameters, False),
+            ("Reference", self.truth.draw, False),
             ("Shadow map", self.maps.draw, False),
+            ("Save", self._save, False),
             ("Keys", self._keys, False),
         ):
             if imgui.collapsing_header(name, imgui.TreeNodeFlags_.default_open if is_open else 0):
@@ -84,6 +95,8 @@ class Panel:
         imgui.text(f"{session.scene.name}, {session.size[0]}x{session.size[1]}{lights}, {last}")
         if session.accumulation:
             imgui.text(f"mean of {session.accumulation.frames} frames{session.noise_text}")
+        if self.saved:
+            imgui.text_wrapped(self.saved)
         if session.error:
             imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(1.0, 0.45, 0.4, 1.0))
             imgui.text_wrapped(session.error)
@@ -159,6 +172,26 @@ class Panel:
                     session.adjust(f"{node.name}.{name}", new)
             imgui.pop_id()
 
+    def _save(self) -> None:
+        imgui, session = self._imgui, self._session
+        if imgui.button("save PNG, EXR and scene file (Ctrl S)"):
+            self._controls.saving = True
+        imgui.set_item_tooltip("Into the folder that the viewer was started in.")
+        touched, on = imgui.checkbox("record camera and light", session.recording)
+        imgui.set_item_tooltip("Switched off, it becomes the scene's motion, which plays and is saved.")
+        if touched:
+            session.record(on)
+
+    def finish(self) -> None:
+        """What waits until the frame is drawn: saving it."""
+        if not self._controls.saving:
+            return
+        self._controls.saving = False
+        try:
+            self.saved = f"saved {save(self._session, FOLDER)}"
+        except Error as error:
+            self.saved = str(error)
+
     def _keys(self) -> None:
         for key, text in HELP:
             self._imgui.text_disabled(key)
@@ -167,8 +200,10 @@ class Panel:
 
     def show(self, canvas: Canvas, area: Area) -> None:
         """What lies over the picture and is made of textures."""
+        self.truth.show(canvas, area)
         self.passes.show(canvas, area)
         self.maps.show(canvas, area)
 
     def close(self) -> None:
         """End what runs in the background."""
+        self.truth.close()

@@ -33,17 +33,12 @@ class PassesPanel:
         """The table and the sliders for what is shown."""
         imgui, session = self._imgui, self._session
         self._hovered = None
-        flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_stretch_prop
-        if imgui.begin_table("passes", 3, flags):
-            imgui.table_setup_column("pass, output", imgui.TableColumnFlags_.width_stretch, 3.0)
-            imgui.table_setup_column("GPU ms", imgui.TableColumnFlags_.width_stretch, 1.0)
-            imgui.table_setup_column("CPU ms", imgui.TableColumnFlags_.width_stretch, 1.0)
-            imgui.table_headers_row()
-            for step in session.plan.steps:
-                self._row(step)
-            for name, why in session.plan.left_out.items():
-                self._left_out(name, why)
-            imgui.end_table()
+        self._line("pass, output", ("GPU ms", "CPU ms"))
+        imgui.separator()
+        for step in session.plan.steps:
+            self._row(step)
+        for name, why in session.plan.left_out.items():
+            self._left_out(name, why)
         if self.pinned:
             _, self._gain = imgui.slider_float(
                 "brightness", self._gain, 0.01, 100.0, "%.3g", imgui.SliderFlags_.logarithmic
@@ -55,37 +50,34 @@ class PassesPanel:
             if imgui.button("back to the picture"):
                 self.pinned = None
 
+    def _line(self, name: str, times: tuple[str, str]) -> None:
+        imgui = self._imgui
+        imgui.text(name)
+        right, width = imgui.get_content_region_avail().x, imgui.calc_text_size("000000 ").x
+        for place, text in zip((2, 1), times, strict=True):
+            imgui.same_line(right - place * width)
+            imgui.text(text)
+
     def _row(self, step: Step) -> None:
         imgui, laps = self._imgui, self._session.laps.get(step.name)
-        imgui.table_next_row()
-        imgui.table_next_column()
-        imgui.text(step.name)
-        for which in (0, 1):
-            imgui.table_next_column()
-            imgui.text(f"{laps[which]:.2f}" if laps else "-")
+        self._line(step.name, (f"{laps[0]:.4g}", f"{laps[1]:.4g}") if laps else ("-", "-"))
         for port, output in step.outputs.items():
-            imgui.table_next_row()
-            imgui.table_next_column()
             source = step.name, port
             pressed, _ = imgui.selectable(
                 f"  {port}  {output.description}##{step.name}",
                 self.pinned == source,
-                imgui.SelectableFlags_.span_all_columns,
             )
             if pressed:
                 self.pinned = None if self.pinned == source else source
             if imgui.is_item_hovered():
                 self._hovered = source
-                imgui.set_tooltip(f"{output.doc}\n{self._size(source)}")
+                imgui.set_tooltip(f"{output.doc}\n{output.description}: {self._size(source)}")
 
     def _left_out(self, name: str, why: str) -> None:
         imgui, laps = self._imgui, self._session.laps.get(name)
-        imgui.table_next_row()
-        imgui.table_next_column()
-        imgui.text_disabled(name)
-        saved = f"; last it took {laps[0]:.2f} ms" if laps else ""
+        saved = f"; that saves about {max(laps):.4g} ms" if laps else ""
         imgui.push_text_wrap_pos(0.0)
-        imgui.text_disabled(f"left out: {why}{saved}")
+        imgui.text_disabled(f"{name}: left out: {why}{saved}")
         imgui.pop_text_wrap_pos()
 
     def _size(self, source: Source) -> str:

@@ -6,10 +6,13 @@ have changed, all of them where scene, camera or light have. Whatever fails leav
 
 from __future__ import annotations
 
+import time as clock
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from ..accumulation import Accumulation, readers
 from ..camera import Camera
@@ -26,6 +29,7 @@ from ..scene import Scene
 from ..timing import Record
 from .navigation import as_camera
 from .noise import Noise
+from .path import Path
 
 FRAMES_KEPT = 240
 """Frame times that are kept for the plot."""
@@ -50,12 +54,14 @@ class Session:
         self.graph, self.settings, self.seed = graph, dict(settings or {}), seed
         self.renderer = Renderer(size, graph, set=self.settings, window=window)
         self.error = ""
+        self.version = 0
         self.progressive = self.playing = self.from_light = False
         self.accumulation: Accumulation | None = None
         self.frame_ms: deque[float] = deque(maxlen=FRAMES_KEPT)
         self.laps: dict[str, tuple[float, float]] = {}
         self.counters: dict[str, int] = {}
         self._noise = Noise()
+        self._path: Path | None = None
         self._undo: Callable[[], None] = lambda: None
         self._stale: set[str] | None = None
         self._drawn: Plan | None = None
@@ -183,8 +189,12 @@ class Session:
         if self.playing:
             self.time += 1 / FRAMES_PER_SECOND
             self._place(self.scene.at(self.time))
+        if self._path:
+            self._path.add(clock.monotonic(), self.camera, self.spotlight)
         try:
-            return self._draw()
+            changed = self._draw()
+            self.version += changed
+            return changed
         except Error as error:
             self.error = str(error)
             self._undo()
@@ -249,6 +259,62 @@ class Session:
     def image(self) -> Image:
         """The picture on screen."""
         return self.renderer.read(self.plan)
+
+    def settled(self) -> Image:
+        """The same, where passes keep something from frame to frame, as a first frame has it."""
+        if self.accumulation is None:
+            self.renderer.reset()
+            self.moved()
+            self._draw()
+        return self.image()
+
+    def toned(self, radiance: Any) -> np.ndarray:
+        """Display pixels of `radiance` (H, W, 3) by this graph, uint8 (H, W, 4), bottom row first."""
+        place, late = self.plan.outputs["radiance"], readers(self.plan, self.plan.outputs["radiance"])
+        texture = self.output(place)
+        pixels = np.ones((*radiance.shape[:2], 4), np.float32)
+        pixels[..., :3] = radiance[::-1]
+        with self.renderer.gpu.ctx:
+            before = texture.read()
+            try:
+                texture.upload(pixels)
+                self.renderer.draw(self.shown, self.plan, seed=self.seed, steps=late)
+                display: np.ndarray = self.output(self.plan.outputs["display"]).read()
+            finally:
+                texture.upload(before)
+                self.renderer.draw(self.shown, self.plan, seed=self.seed, steps=late)
+        return display
+
+    @property
+    def bounces(self) -> int:
+        """Bounces of indirect light that the graph makes."""
+        counts = [getattr(step.work.params, "bounces", 1) for step in self.plan.steps]
+        return max(counts)
+
+    def kept_motions(self) -> tuple[Camera, Spotlight]:
+        """Eye and light as a scene file should have them: with their motions if they are where those begin."""
+        start = self.scene.at(0.0)
+        camera, light = self.eye, self.spotlight
+        if camera == replace(start.camera, motion=None):
+            camera = self.scene.camera
+        if light == replace(start.spotlight, motion=None):
+            light = self.scene.spotlight
+        return camera, light
+
+    @property
+    def recording(self) -> bool:
+        """Whether the way of camera and light is being recorded."""
+        return self._path is not None
+
+    def record(self, on: bool) -> None:
+        """Record it, or end that: then it is the scene's motion, which can be played and saved."""
+        if on and not self._path:
+            self._path = Path()
+        elif not on and self._path:
+            scene, self._path = self._path.applied(self.scene), None
+            emission = self.emission
+            self._use(scene)
+            self.emission = emission
 
     def close(self) -> None:
         """Give back what is on the device."""

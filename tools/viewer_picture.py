@@ -1,0 +1,45 @@
+"""Takes a screenshot of the viewer on a virtual display: `python tools/viewer_picture.py OUT.png`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+
+from virtual_display import act, display, xdo
+
+SIZE = 900, 720
+"""Of the picture: with the panel it is 1280x720."""
+
+
+def main(target: str) -> int:
+    """The Cornell box with local frames and the shadow map, by the keys that a user would press."""
+    from deferred_ir.gl.window import Window
+    from deferred_ir.image import Image
+    from deferred_ir.loading import load
+    from deferred_ir.viewer.app import Viewer
+    from deferred_ir.viewer.panel import WIDTH
+    from deferred_ir.viewer.session import Session
+
+    with display():
+        window = Window("deferred-ir", (SIZE[0] + WIDTH, SIZE[1]))
+        viewer = Viewer(window, Session(load("cornell"), SIZE, window))
+        try:
+            viewer.frame()
+            xdo("search", "--sync", "--name", "deferred-ir", "windowfocus", "--sync")
+            act(viewer, "mousemove", 450, 10)
+            act(viewer, "mousedown", 3)
+            for x in range(440, 350, -10):
+                act(viewer, "mousemove", x, 10, frames=2)
+            act(viewer, "mouseup", 3)
+            for key in ("f", "m"):
+                act(viewer, "key", key)
+            Image(None, viewer.screenshot()).save(target)
+        finally:
+            viewer.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

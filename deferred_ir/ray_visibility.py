@@ -25,7 +25,7 @@ BITS = 32
 """VPLs in a word."""
 
 THIN = 0.1
-"""Share of pixels for which the filter finds too few neighbours, so that they ask all VPLs; a guess, for costs."""
+"""Part of all VPLs that a pixel asks beyond its share, on average: those missing beside edges; a guess, for costs."""
 
 Share = tuple[Ints, slice]
 """Rows of surfaces, and the VPLs that light them."""

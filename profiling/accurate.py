@@ -47,12 +47,13 @@ class Run:
 
 def settings(table: str, vpls: int) -> dict[str, dict[str, Any]]:
     """What `--set` would be told, by the names of the rows."""
-    return {
+    tables: dict[str, dict[str, dict[str, Any]]] = {
         "samples": {f"{n:g}": {"near_field.samples": n} for n in SAMPLES},
         "clamp": {f"{f:g} / sqrt(N)": {"vpl.clamp": f / sqrt(vpls)} for f in FACTORS},
         "candidates": {f"{n}": {"vpl.candidates": n} for n in CANDIDATES},
         "visibility": {name: {"shadow_rays.visibility": name} for name in VISIBILITY},
-    }[table]
+    }
+    return tables[table]
 
 
 def measure(

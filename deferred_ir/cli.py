@@ -245,8 +245,9 @@ def _check(arguments: argparse.Namespace) -> int:
 
 def _graph(arguments: argparse.Namespace) -> int:
     from . import config, plan_text
-    from .graph import Facts, compile
+    from .graph import Facts
     from .options import chosen_settings
+    from .planning import compile
     from .scene import RenderDefaults
 
     defaults, facts = RenderDefaults(), Facts()

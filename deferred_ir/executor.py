@@ -1,4 +1,4 @@
-"""Runs plans: allocates what `graph.compile` planned, binds each pass's ports by name, and times the passes.
+"""Runs plans: allocates what `planning.compile` planned, binds each pass's ports by name, and times the passes.
 
 Resources are kept by (pass, port, description) and survive a new plan that still has them; programs are kept by source
 and defines.

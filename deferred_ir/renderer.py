@@ -22,8 +22,9 @@ from .gl.devices import Loader
 from .gl.gpu import Gpu
 from .gl.scene_buffers import SceneBuffers
 from .gl.timers import Timers
-from .graph import Graph, Pass, Plan, compile
+from .graph import Graph, Pass, Plan
 from .image import Image
+from .planning import compile
 from .scene import Scene
 from .timing import Record
 from .tracing import Tracer

@@ -15,11 +15,11 @@ import numpy as np
 
 from deferred_ir.camera import Camera
 from deferred_ir.config import graph_hash, load_graph
-from deferred_ir.graph import compile
 from deferred_ir.lights import NEAR
 from deferred_ir.maps import WIDEST_PLANAR, MapParams
 from deferred_ir.params import specs
 from deferred_ir.path_tracer import Progress
+from deferred_ir.planning import compile
 from deferred_ir.renderer import Renderer
 from deferred_ir.scene import Scene
 from deferred_ir.tracing import Tracer

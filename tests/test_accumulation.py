@@ -18,7 +18,7 @@ from deferred_ir.accumulation import Accumulation, readers
 from deferred_ir.cli import main
 from deferred_ir.config import graph_names
 from deferred_ir.errors import GraphError, SettingError
-from deferred_ir.graph import compile
+from deferred_ir.planning import compile
 from deferred_ir.renderer import Renderer
 from deferred_ir.sampling import frame_seed
 from deferred_ir.timing import Record

@@ -20,7 +20,7 @@ from PIL import Image
 from deferred_ir import gltf_structure, load, materials, models
 from deferred_ir.config import load_graph
 from deferred_ir.errors import Error, GraphError, SceneError
-from deferred_ir.graph import compile
+from deferred_ir.planning import compile
 from deferred_ir.renderer import Renderer
 
 MENDED = {

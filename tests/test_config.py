@@ -16,8 +16,9 @@ from test_scene_file import toml
 from deferred_ir import config
 from deferred_ir.config import graph_hash, graph_names, load_graph
 from deferred_ir.errors import GraphError
-from deferred_ir.graph import Facts, Input, Output, Pass, Texture, compile
+from deferred_ir.graph import Facts, Input, Output, Pass, Texture
 from deferred_ir.params import param, specs
+from deferred_ir.planning import compile
 
 SMALL = """
 [outputs]

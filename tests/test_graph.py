@@ -13,7 +13,8 @@ from fake_passes import Fake, graph, names, reads, source
 from hypothesis import given
 from hypothesis import strategies as st
 
-from deferred_ir.graph import Facts, Graph, Input, Output, Pass, Texture, compile
+from deferred_ir.graph import Facts, Graph, Input, Output, Pass, Texture
+from deferred_ir.planning import compile
 
 
 def test_a_pass_that_no_output_needs_is_left_out_with_the_reason():
@@ -124,7 +125,7 @@ def test_the_order_is_the_same_in_every_process():
     script = (
         "import sys; sys.path.insert(0, 'tests')\n"
         "from test_graph import diamond, names\n"
-        "from deferred_ir.graph import compile\n"
+        "from deferred_ir.planning import compile\n"
         "print(*names(compile(diamond(), ['image'])))\n"
         "assert 'moderngl' not in sys.modules and 'numpy' not in sys.modules\n"
     )
@@ -147,7 +148,7 @@ def test_compiling_the_built_in_graphs_loads_no_opengl():
     assert "moderngl" not in python(
         "import sys\n"
         "from deferred_ir.config import graph_names, load_graph\n"
-        "from deferred_ir.graph import compile\n"
+        "from deferred_ir.planning import compile\n"
         "for name in graph_names():\n"
         "    graph = load_graph(name)\n"
         "    compile(graph, list(graph.outputs))\n"

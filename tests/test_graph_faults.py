@@ -9,7 +9,8 @@ import pytest
 from fake_passes import Fake, graph, reads, source
 
 from deferred_ir.errors import GraphError
-from deferred_ir.graph import Buffer, Facts, Graph, Output, compile
+from deferred_ir.graph import Buffer, Facts, Graph, Output
+from deferred_ir.planning import compile
 
 
 def faults(broken: Graph, outputs: Sequence[str] = ("image",), facts: Facts | None = None) -> str:

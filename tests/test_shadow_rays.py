@@ -11,9 +11,10 @@ from small_scenes import crooked_room, room, smooth_scene
 
 from deferred_ir import vpl_reference
 from deferred_ir.config import load_graph
-from deferred_ir.graph import Facts, compile
+from deferred_ir.graph import Facts
 from deferred_ir.interleaving import deal, places, sub_buffers
 from deferred_ir.path_tracer import PathTracer
+from deferred_ir.planning import compile
 from deferred_ir.vpls import Vpls, cast
 
 SIZE = (50, 38)  # no multiple of 4

@@ -14,8 +14,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 from pages import ROOT, between
 
 from deferred_ir import config
-from deferred_ir.graph import Facts, Step, compile
+from deferred_ir.graph import Facts, Step
 from deferred_ir.params import specs
+from deferred_ir.planning import compile
 
 PAGE = ROOT / "docs" / "graph.md"
 BEGIN = "<!-- passes: written by tools/pass_tables.py -->"

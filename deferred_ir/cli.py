@@ -81,6 +81,9 @@ def _parser() -> Parser:
         metavar="K",
         help="average K frames of fresh samples in each image; Ctrl-C keeps what is done",
     )
+    render.add_argument(
+        "--reuse", action="store_true", help="run a pass only if something has changed that its outputs are made of"
+    )
     render.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
     render.add_argument("--json", metavar="RUN.json", help="write what was rendered, and how long it took")
 

@@ -18,6 +18,7 @@ from .gl.shaders import ShaderLibrary
 from .gl.timers import Timers
 from .graph import Buffer, Description, Plan, Step, Texture
 from .io import Io, Resource
+from .reuse import Runs
 
 FRAME_BLOCK = 0
 
@@ -35,25 +36,43 @@ class Executor:
         self._plan: Plan | None = None
         self._size = (0, 0)
         self._ios: list[Io] = []
+        self._runs = Runs()
+        self.kept: tuple[str, ...] = ()
 
     def run(
         self, plan: Plan, frame: Frame, timers: Timers | None = None, *, steps: Container[str] | None = None
     ) -> None:
-        """Draw one frame, or of its passes only those named in `steps`; timers get a lap for each."""
+        """Draw one frame, or of its passes only those named in `steps`; timers get a lap for each that runs.
+
+        `kept` names those that did not run since they would have written what they wrote last, if frame.reuse.
+        """
         if plan is not self._plan or frame.size != self._size:
             self._allocate(plan, frame.size)
         self.counters.clear()
+        kept: list[str] = []
         self._frame_block.write(frame.block())
         self._frame_block.bind_to_uniform_block(FRAME_BLOCK)
         frame.buffers.bind()
         for step, io in zip(plan.steps, self._ios, strict=True):
             if steps is not None and step.name not in steps:
                 continue
+            standing = self._runs.standing(step, io, frame) if frame.reuse else None
+            if standing is not None:
+                self.counters.update(standing)
+                kept.append(step.name)
+                continue
+            self._runs.forget(step)
             self.gpu.reset()
-            io.bind()
+            io.begin()
             if timers:
                 timers.mark(step.name)
             step.work.execute(frame, io)
+            for port in step.outputs:
+                _touch(io[port])
+            self._runs.remember(step, io, frame)
+            self.counters.update(io.counters)
+            self.counters.update(io.standing)
+        self.kept = tuple(kept)
 
     def resource(self, source: tuple[str, str]) -> Any:
         """What (pass, port) wrote in the last frame."""
@@ -69,7 +88,8 @@ class Executor:
         return {port: self.resource(source) for port, source in sources.items()}
 
     def forget(self) -> None:
-        """Drop what passes keep from frame to frame."""
+        """Drop what passes keep from frame to frame; the next frame runs all of them."""
+        self._runs.clear()
         for resource in self._all():
             resource.kept = None
 
@@ -79,6 +99,7 @@ class Executor:
             changed = self.library.reload()
         if changed:
             self._plan = None  # passes hold the programs that they have used
+            self._runs.clear()
         return changed
 
     def memory(self) -> dict[str, int]:
@@ -113,7 +134,7 @@ class Executor:
         for step in plan.steps:
             inputs = {port: ports[source] if source else None for port, source in step.sources.items()}
             outputs = {port: ports[step.name, port] for port in step.outputs}
-            io = Io(self.library, step, {**inputs, **outputs}, written, self.counters)
+            io = Io(self.library, step, {**inputs, **outputs}, written)
             attached = {port: inputs[port] for port, declared in step.work.inputs.items() if declared.attach}
             drawn = {port: ports[step.name, port] for port, output in step.outputs.items() if output.attach}
             targets = {port: r for port, r in {**drawn, **attached}.items() if isinstance(r, GpuTexture)}
@@ -161,6 +182,13 @@ class Executor:
 def _size(description: Description, frame: tuple[int, int]) -> tuple[int, int] | None:
     """The frame's size where the resource depends on it."""
     return frame if isinstance(description, Texture) and description.size is None else None
+
+
+def _touch(resource: Resource) -> None:
+    """A pass has drawn into it. What it wrote into a buffer the buffer knows."""
+    for single in resource if isinstance(resource, list) else [resource]:
+        if isinstance(single, GpuTexture):
+            single.touch()
 
 
 def _release(resource: Resource) -> None:

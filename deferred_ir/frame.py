@@ -28,7 +28,10 @@ FRAME = np.dtype(
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What a pass may know of a frame. `scene` has camera and light at `time` [s]; `buffers` is it on the GPU."""
+    """What a pass may know of a frame. `scene` has camera and light at `time` [s]; `buffers` is it on the GPU.
+
+    reuse: what the last frame left may be used again where it would come out the same.
+    """
 
     size: tuple[int, int]
     scene: Scene
@@ -36,6 +39,7 @@ class Frame:
     tracer: Callable[[], Tracer]
     seed: int = 0
     time: float = 0.0
+    reuse: bool = False
     _surfaces: dict[tuple[GpuTexture, GpuTexture], Surfaces] = field(default_factory=dict, init=False)
 
     @property

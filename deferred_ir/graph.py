@@ -88,6 +88,8 @@ class Output:
 
 
 NO_PORTS: Mapping[str, Any] = {}
+FRAME_PARTS = frozenset({"camera", "light", "models", "seed", "time"})
+"""What a pass can read of a frame; `camera` includes the frame's size."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,13 @@ class Pass:
         """Why this scene does not need the pass, or None."""
         del facts
         return None
+
+    def depends(self) -> frozenset[str]:
+        """Of which FRAME_PARTS its outputs are made, besides its parameters and inputs: all, unless it names fewer.
+
+        Where frames are reused, it runs only if one of them has changed.
+        """
+        return FRAME_PARTS
 
     def subpasses(
         self, inputs: Mapping[str, Description | None], ports: Mapping[str, Any] = NO_PORTS

@@ -9,8 +9,6 @@ A ray that misses stands for its site, too: the light of its cell is lost, and t
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 
 from .disc_cells import Cells, most_crowded
@@ -19,6 +17,7 @@ from .lights import Spotlight, frames
 from .sampling import disc as unit_disc
 from .tracing import Tracer
 from .typing import Array, Bools, Ints
+from .versions import new_version, new_versions
 from .vpls import Vpls
 
 BETTER = 1.05
@@ -27,14 +26,16 @@ MARGIN = 0.9
 """New sites stay off the rim by this, over the root of their number: about half their distance from one another."""
 GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of the additive sequence in the unit square whose points keep apart best (Roberts 2018, R2)."""
-_numbers = itertools.count(1)
 
 
 class IncrementalVpls:
     """At most `count` sites and what the rays through them met. Slot i keeps its VPL until that is given up.
 
-    The same `seed` and the same frames give the same VPLs again.
+    The same `seed` and the same frames give the same VPLs again. at_rest: the last frame changed no site, so the next
+    one will not either if nothing moves.
     """
+
+    at_rest = False
 
     def __init__(self, count: int, seed: int = 0) -> None:
         self._rng = np.random.default_rng(seed)
@@ -71,13 +72,14 @@ class IncrementalVpls:
         place = np.zeros((len(self.used), 2))
         place[slots] = cells.sites
         self._shoot(light, tracer, fresh, disc.directions(place[fresh]))
+        self.at_rest = not len(fresh)
         return self._lit(light, disc.power)
 
     def spot_version(self, light: Spotlight) -> int:
         """A number that changes when the spotlight sees something else than before."""
         view = (light.position, light.look_at, light.fov)
         if view != self._spot[0]:
-            self._spot = view, next(_numbers)
+            self._spot = view, new_version()
         return self._spot[1]
 
     def _turn(self, light: Spotlight) -> None:
@@ -149,7 +151,7 @@ class IncrementalVpls:
         self.used[slots], self.landed[slots] = True, hits.hit
         self.position[slots], self.albedo[slots] = hits.position, hits.albedo
         self.normal[slots], self.shading_normal[slots] = hits.normal, hits.shading_normal
-        self.version[slots] = [next(_numbers) for _ in slots]
+        self.version[slots] = new_versions(len(slots))
 
     def _lit(self, light: Spotlight, power: float) -> Vpls:
         """What is there; each VPL carries the light of its cell."""

@@ -22,7 +22,8 @@ SCENE_SAMPLERS = {"albedo_texture"}
 class Io:
     """A pass's ports during `execute`: `io["depth"]` is a resource; `io.program(...)` knows the inputs' defines.
 
-    written: the defines of each (pass, port) of the plan. counters: where figures of the frame are published.
+    written: the defines of each (pass, port) of the plan. What a run publishes: counters, of its work; standing, of
+    what its outputs hold; again: whether the next frame must run the pass even if nothing that it is made of changes.
     """
 
     def __init__(
@@ -31,9 +32,11 @@ class Io:
         step: Step,
         ports: Mapping[str, Resource | None],
         written: Mapping[tuple[str, str], Mapping[str, int | float]],
-        counters: Counter[str],
     ) -> None:
-        self._library, self._step, self._ports, self._counters = library, step, ports, counters
+        self._library, self._step, self._ports = library, step, ports
+        self.counters: Counter[str] = Counter()
+        self.standing: Counter[str] = Counter()
+        self.again = False
         self.gpu = library.gpu
         self._framebuffer: Framebuffer | None = None
         self._programs: dict[Any, Program] = {}
@@ -64,8 +67,11 @@ class Io:
         """Give the pass its render target."""
         self._framebuffer = framebuffer
 
-    def bind(self) -> None:
-        """Bind the framebuffer and all sampled inputs."""
+    def begin(self) -> None:
+        """Before a run: bind the framebuffer and all sampled inputs; nothing is published yet."""
+        self.counters.clear()
+        self.standing.clear()
+        self.again = False
         if self._framebuffer:
             self._framebuffer.bind()
         for name, unit in self._units.items():
@@ -85,8 +91,16 @@ class Io:
         return self._programs[key]
 
     def count(self, name: str, value: int) -> None:
-        """Publish a figure of this frame, such as the number of maps drawn."""
-        self._counters[name] += value
+        """Publish how much work this run did, such as the number of maps drawn; none where the pass is not run."""
+        self.counters[name] += value
+
+    def state(self, name: str, value: int) -> None:
+        """Publish a figure of what the outputs hold, such as the number of VPLs alive."""
+        self.standing[name] += value
+
+    def repeat(self) -> None:
+        """Let the next frame run the pass in any case: what it keeps from frame to frame has not come to rest."""
+        self.again = True
 
 
 class FullscreenPass(Pass):

@@ -45,6 +45,7 @@ def render(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
         graph_name,
         arguments.device,
         set=chosen_settings(defaults, settings, arguments.vpls),
+        reuse=arguments.reuse,
     ) as renderer:
         print(f"OpenGL on {renderer.gpu.device}", file=sys.stderr)
         graph = renderer.graph()

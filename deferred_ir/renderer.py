@@ -38,7 +38,8 @@ class Renderer:
 
     size: (width, height) in pixels. graph: a built-in name or a graph file. device: see `deferred-ir devices`.
     set: parameters of passes, {"pass.param": value}. passes: pass classes of your own, {type name: class}, which a
-    graph file then names. window: its context, which is current, instead of a headless one on `device`.
+    graph file then names. reuse: a pass runs only if something has changed that its outputs are made of; else every
+    frame redoes everything. window: its context, which is current, instead of a headless one on `device`.
 
     One context, one scene upload: render as often as you like, and close it (or use `with`). It belongs to the thread
     that made it.
@@ -52,11 +53,12 @@ class Renderer:
         *,
         set: Mapping[str, Any] | None = None,
         passes: Mapping[str, type[Pass]] | None = None,
+        reuse: bool = False,
         window: Loader | None = None,
     ) -> None:
         if not isinstance(size, Sequence) or len(size) != 2 or not all(isinstance(n, Integral) and n > 0 for n in size):
             raise SettingError(f"size {size!r}: wants two whole numbers above 0, width and height")
-        self.size = int(size[0]), int(size[1])
+        self.size, self.reuse = (int(size[0]), int(size[1])), reuse
         self._graph_name, self._set, self._passes = graph, dict(set or {}), dict(passes or {})
         self._graphs: dict[int | None, Graph] = {}
         self._plans: dict[Any, Plan] = {}
@@ -156,7 +158,7 @@ class Renderer:
             self._upload(scene)
             assert self._buffers
             start = clock.perf_counter()
-            frame = Frame(self.size, scene.at(time).centred, self._buffers, self.tracer, seed, time)
+            frame = Frame(self.size, scene.at(time).centred, self._buffers, self.tracer, seed, time, self.reuse)
             timers = self._timers if record else None
             with timers.frame() if timers else nullcontext():
                 self.executor.run(plan, frame, timers, steps=steps)
@@ -165,9 +167,10 @@ class Renderer:
                 record.frame_ms.append((clock.perf_counter() - start) * 1e3)
                 record.laps += timers.collect()
                 record.counters.append(dict(self.executor.counters))
+                record.kept.append(self.executor.kept)
 
     def reset(self) -> None:
-        """Drop what passes keep from frame to frame (graph `incremental`): the next frame starts afresh."""
+        """Drop what is kept from frame to frame: the next one starts afresh, and runs every pass."""
         self.executor.forget()
 
     def finish(self, record: Record) -> None:

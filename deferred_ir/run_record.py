@@ -54,10 +54,20 @@ def run_record(
         "passes": passes,
         "maps_drawn": [counters.get("maps_drawn", 0) for counters in record.counters],
         "stand_in": _stand_in(last),
-        "left_out": [{"what": name, "why": why, "ms": None, "bytes": None} for name, why in plan.left_out.items()],
+        "left_out": _left_out(plan, record),
         "bias": _bias(renderer, scene, graph, plan),
         "memory_bytes": renderer.memory(),
     }
+
+
+def _left_out(plan: Plan, record: Record) -> list[dict[str, Any]]:
+    """What did not run, why, and what that saved in a frame where it is known."""
+    left_out = [{"what": name, "why": why, "ms": None, "bytes": None} for name, why in plan.left_out.items()]
+    frames = len(record.kept)
+    return left_out + [
+        {"what": name, "why": f"in {n} of {frames} frames nothing that it is made of changed", "ms": ms, "bytes": None}
+        for name, n, ms in record.reused()
+    ]
 
 
 def _stand_in(counters: Mapping[str, int]) -> dict[str, int] | None:

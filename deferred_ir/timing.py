@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import median
@@ -9,11 +10,15 @@ from statistics import median
 
 @dataclass
 class Record:
-    """What repeated frames took. Times in milliseconds; `laps` holds for each frame label -> (GPU, CPU)."""
+    """What repeated frames took. Times in milliseconds; `laps` holds for each frame label -> (GPU, CPU).
+
+    kept: for each frame the passes that did not run, since what they had written was still right.
+    """
 
     frame_ms: list[float] = field(default_factory=list)
     laps: list[dict[str, tuple[float, float]]] = field(default_factory=list)
     counters: list[dict[str, int]] = field(default_factory=list)
+    kept: list[tuple[str, ...]] = field(default_factory=list)
 
     def join(self, parts: Record) -> None:
         """Add one frame that was drawn in parts: times are added up, counters stay those of each part."""
@@ -25,14 +30,20 @@ class Record:
         self.frame_ms.append(sum(parts.frame_ms))
         self.laps.append(laps)
         self.counters += parts.counters
+        self.kept += parts.kept
 
     def passes(self) -> list[dict[str, float | str]]:
-        """Name, GPU and CPU median of each pass, in the order in which they ran."""
+        """Name, GPU and CPU median of each pass, in the order in which they ran; 0 in frames that kept its outputs."""
         names = list(dict.fromkeys(label for frame in self.laps for label in frame))
-        return [
-            {"name": name, "gpu_ms": _median(self.laps, name, 0), "cpu_ms": _median(self.laps, name, 1)}
-            for name in names
-        ]
+        rest = dict.fromkeys(names, (0.0, 0.0))
+        laps = [{**rest, **frame} for frame in self.laps]
+        return [{"name": name, "gpu_ms": _median(laps, name, 0), "cpu_ms": _median(laps, name, 1)} for name in names]
+
+    def reused(self) -> list[tuple[str, int, float | None]]:
+        """Passes that did not run in all frames: name, in how many not, and their GPU median where they ran."""
+        frames = Counter(name for kept in self.kept for name in kept)
+        ran = {name: [frame for frame in self.laps if name in frame] for name in frames}
+        return [(name, n, _median(ran[name], name, 0) if ran[name] else None) for name, n in frames.items()]
 
     def median_frame_ms(self) -> float:
         """Median wall time of a whole frame."""
@@ -40,4 +51,4 @@ class Record:
 
 
 def _median(laps: Sequence[dict[str, tuple[float, float]]], name: str, which: int) -> float:
-    return round(median(frame[name][which] for frame in laps if name in frame), 4)
+    return round(median(frame[name][which] for frame in laps), 4)

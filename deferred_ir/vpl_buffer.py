@@ -8,11 +8,13 @@ from typing import Literal
 
 import numpy as np
 
+from .gl.resources import GpuBuffer
 from .graph import Buffer, Output
 from .lights import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
 from .params import param
 from .scene import Scene
-from .typing import Ints
+from .typing import Bools, Ints
+from .versions import new_versions
 from .vpls import Vpls
 
 AUTO_CLAMP = 0.64
@@ -55,3 +57,21 @@ def packed(scene: Scene, vpls: Vpls, params: VplParams, tiles: Ints) -> np.ndarr
     records["clamp_squared"][0] = light.radius
     records["clamp_squared"][1:] = (params.clamp_fraction * scene.geometry.diagonal) ** 2
     return records
+
+
+def map_versions(lights: GpuBuffer, records: np.ndarray, scene: Scene) -> Ints:
+    """Versions (n,) of LIGHT records (n,) that come next in `lights`: a record keeps its own while its map would.
+
+    A map shows the same while the models stay and light i looks as it did; how bright it is does not matter.
+    """
+    shapes = records.copy()
+    shapes["emission"] = shapes["clamp_squared"] = 0
+    looks = shapes.view(np.uint32).reshape(len(records), -1)
+    geometry, before, versions = lights.kept or (None, looks[:0], np.zeros(0, int))
+    both = min(len(looks), len(before)) if geometry is scene.geometry else 0
+    same: Bools = np.zeros(len(looks), bool)
+    same[:both] = (looks[:both] == before[:both]).all(axis=1)
+    made = new_versions(len(looks))
+    made[same] = versions[:both][same[:both]]
+    lights.kept = scene.geometry, looks, made
+    return made

@@ -45,6 +45,10 @@ class Forward(Pass):
         del inputs
         return {"radiance": Output("reflected radiance, linear RGB; 0 on the background", Texture("rgba32f"))}
 
+    def depends(self) -> frozenset[str]:
+        """The scene is drawn from the camera."""
+        return frozenset({"camera", "models"})
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Draw the scene for each group of lights."""
         ctx, lights, group = io.gpu.ctx, io["lights"], self.params.lights_per_draw

@@ -61,6 +61,10 @@ class Gather(Pass):
             "count": Output("how many", Texture("r32ui", (1, 1)), attach=False),
         }
 
+    def depends(self) -> frozenset[str]:
+        """Positions come back from the depth; the window leans to a side by the seed."""
+        return frozenset({"camera", "seed"})
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Filter, then light the pixels that it left."""
         gpu, vpls = io.gpu, io["vpls"]

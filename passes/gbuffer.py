@@ -24,6 +24,10 @@ class GBuffer(Pass):
             "depth": Output("reversed depth, near/z; 0 is the background", Texture("depth32f")),
         }
 
+    def depends(self) -> frozenset[str]:
+        """What the camera sees."""
+        return frozenset({"camera", "models"})
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Draw all triangles."""
         io.framebuffer.clear_color(0)

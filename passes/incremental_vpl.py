@@ -46,6 +46,10 @@ class IncrementalVpl(Pass):
         """Whether there is a clamp, and anything to clamp."""
         return replace(facts, clamped=self.params.clamp_fraction > 0 and self.params.count > 0)
 
+    def depends(self) -> frozenset[str]:
+        """Where the light falls."""
+        return frozenset({"light", "models", "seed"})
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Go on from what the last frame left, pack, upload."""
         light, p, lights = frame.scene.spotlight, self.params, io["lights"]
@@ -58,9 +62,11 @@ class IncrementalVpl(Pass):
             lights.kept = key, IncrementalVpls(p.count, frame.seed)
         state: IncrementalVpls = lights.kept[1]
         vpls = state.update(light, frame.tracer(), least=p.least, most=p.most)
+        if not state.at_rest:
+            io.repeat()
         versions = np.append(state.spot_version(light), state.version[vpls.ray])
         lights.write(packed(frame.scene, vpls, p, vpls.ray), versions)
-        io.count("vpls_alive", len(vpls))
+        io.state("vpls_alive", len(vpls))
 
 
 PASS = IncrementalVpl

@@ -49,6 +49,10 @@ class Interleave(Pass):
         del facts
         return "n is 1: every pixel is lit by all VPLs" if self.params.n == 1 else None
 
+    def depends(self) -> frozenset[str]:
+        """Nothing else."""
+        return frozenset()
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Shuffle and upload."""
         del frame

@@ -32,6 +32,10 @@ class Interleaved(Pass):
         del inputs
         return {"shares": Output("irradiance in sub-buffers; 0 on the background", Texture("rgba32f"))}
 
+    def depends(self) -> frozenset[str]:
+        """Positions come back from the depth."""
+        return frozenset({"camera"})
+
     def execute(self, frame: Frame, io: Io) -> None:
         """A draw for each share, or more where it crosses from block to block of the buffer."""
         vpls, n = io["vpls"], int(io.defines["INTERLEAVE"])

@@ -36,6 +36,10 @@ class Lighting(Pass):
         del inputs
         return {"radiance": Output("reflected radiance, linear RGB; 0 on the background", Texture("rgba32f"))}
 
+    def depends(self) -> frozenset[str]:
+        """Positions come back from the depth."""
+        return frozenset({"camera"})
+
     def execute(self, frame: Frame, io: Io) -> None:
         """One fullscreen draw a block of lights."""
         del frame

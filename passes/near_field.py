@@ -51,6 +51,10 @@ class NearField(Pass):
             return "the spotlight emits nothing"
         return None if facts.clamped else "nothing is clamped: vpl.clamp or vpl.count is 0"
 
+    def depends(self) -> frozenset[str]:
+        """Rays from what the camera sees, which the light hits."""
+        return frozenset({"camera", "light", "models", "seed"})
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Read back, trace, upload."""
         vpl = io["lights"].records[1:2]

@@ -43,6 +43,10 @@ class PlainMaps(Pass):
         """A dark spotlight makes no VPLs either."""
         return None if facts.emits else "no light needs one: the spotlight emits nothing"
 
+    def depends(self) -> frozenset[str]:
+        """The lights come as an input."""
+        return frozenset({"models"})
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Draw all triangles for each light."""
         self.params.prepare(io.gpu)

@@ -55,6 +55,10 @@ class ShadowMaps(Pass):
         """A dark spotlight makes no VPLs either."""
         return None if facts.emits else "no light needs one: the spotlight emits nothing"
 
+    def depends(self) -> frozenset[str]:
+        """The lights come as an input."""
+        return frozenset({"models"})
+
     def subpasses(
         self, inputs: Mapping[str, Description | None], ports: Mapping[str, Any] = NO_PORTS
     ) -> Sequence[Mapping[str, Any]]:

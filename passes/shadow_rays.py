@@ -66,6 +66,10 @@ class ShadowRays(Pass):
             return None
         return f"maps should take less time: {maps:.2g} ms for each VPL, rays {rays:.2g} ms"
 
+    def depends(self) -> frozenset[str]:
+        """Rays from what the camera sees to the lights."""
+        return frozenset({"camera", "light", "models", "seed"})
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Read back, trace, upload."""
         vpls, parts = io["vpls"].records, io["vpls"].description.parts

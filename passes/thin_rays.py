@@ -42,6 +42,10 @@ class ThinRays(Pass):
         del inputs
         return {"irradiance": Output("irradiance at these pixels; 0 at all others", Texture("rgba32f"), attach=False)}
 
+    def depends(self) -> frozenset[str]:
+        """Rays from what the camera sees; the lights come as an input."""
+        return frozenset({"camera", "models"})
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Read back, trace, upload."""
         width, height = frame.size

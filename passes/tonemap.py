@@ -39,6 +39,10 @@ class Tonemap(FullscreenPass):
         del inputs
         return {"color": Output("sRGB-encoded display colour", Texture("rgba8"))}
 
+    def depends(self) -> frozenset[str]:
+        """Nothing else."""
+        return frozenset()
+
     def uniforms(self) -> Mapping[str, Any]:
         """The operator as its number."""
         auto = self.params.exposure == "auto"

@@ -14,7 +14,7 @@ from deferred_ir.io import Io
 from deferred_ir.params import param
 from deferred_ir.resampling import effects, probes, resample
 from deferred_ir.sampling import Pattern, warn_unbalanced
-from deferred_ir.vpl_buffer import VplParams, output, packed
+from deferred_ir.vpl_buffer import VplParams, map_versions, output, packed
 from deferred_ir.vpls import NONE, Vpls, cast
 
 
@@ -47,12 +47,17 @@ class Vpl(Pass):
         """Whether there is a clamp, and anything to clamp."""
         return replace(facts, clamped=self.params.clamp_fraction > 0 and self.params.count > 0)
 
+    def depends(self) -> frozenset[str]:
+        """Where the light falls, and for a choice among candidates what the camera sees."""
+        return frozenset({"light", "models", "seed"} | ({"camera"} if self.params.candidates > 1 else set()))
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Cast, pack, upload."""
         light, p = frame.scene.spotlight, self.params
         vpls = self._cast(frame) if p.count > 0 and any(light.emission) else NONE
-        io["lights"].write(packed(frame.scene, vpls, p, np.arange(len(vpls))))
-        io.count("vpls_alive", len(vpls))
+        records, lights = packed(frame.scene, vpls, p, np.arange(len(vpls))), io["lights"]
+        lights.write(records, map_versions(lights, records, frame.scene) if frame.reuse else None)
+        io.state("vpls_alive", len(vpls))
 
     def _cast(self, frame: Frame) -> Vpls:
         """The VPLs of a frame; with candidates, `count` of them, or more where further bounces bring more."""

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import DeviceError
 from ..graph import Buffer, Texture
 from ..typing import Ints
+from ..versions import new_version
 from . import raw
 from .gpu import Gpu
 
@@ -53,7 +54,8 @@ SCRATCH_UNIT = 31
 class GpuTexture:
     """An immutable 2D texture or array of one level. `size` is (width, height).
 
-    kept: what its writer notes about what it holds, for the frames that follow.
+    kept: what its writer notes about what it holds, for the frames that follow. version: another number whenever
+    something was written into it, unlike that of any other texture or buffer.
     """
 
     kept: Any = None
@@ -63,6 +65,7 @@ class GpuTexture:
         self.format = FORMATS[description.format]
         self.nbytes = size[0] * size[1] * max(description.layers, 1) * self.format.bytes
         self.target = raw.TEXTURE_2D_ARRAY if description.layers else raw.TEXTURE_2D
+        self.touch()
         gl = gpu.gl
         self.glo = gl.make("GenTextures")
         self._bind_to_work()
@@ -76,8 +79,13 @@ class GpuTexture:
             self.release()
             raise
 
+    def touch(self) -> None:
+        """Note that something else was written into it."""
+        self.version = new_version()
+
     def upload(self, pixels: Any) -> None:
         """Fill it from (H, W, channels) or (layers, H, W, channels), bottom row first, in the format's dtype."""
+        self.touch()
         gl, data = self.gpu.gl, np.ascontiguousarray(pixels, self.format.dtype)
         self._bind_to_work()
         gl.PixelStorei(0x0CF5, 1)  # UNPACK_ALIGNMENT
@@ -177,7 +185,7 @@ class GpuBuffer:
     """A buffer of records that a pass writes from the CPU; `records` is what it wrote last.
 
     versions: a number for each record; as long as it is the same, so is what is drawn for that record. None: unknown.
-    kept: what its writer notes for the frames that follow.
+    kept: what its writer notes for the frames that follow. version: another number whenever what it holds has changed.
     """
 
     kept: Any = None
@@ -188,14 +196,20 @@ class GpuBuffer:
         self.buffer = gpu.ctx.buffer(reserve=self.nbytes, dynamic=True)
         gpu.gl.check(f"buffer of {description}")
         self.records: np.ndarray = np.zeros(0)
+        self._held: tuple[bytes, bytes | None] = b"", None
         self.versions: Ints | None = None
+        self.version = new_version()
 
     def write(self, records: np.ndarray, versions: Ints | None = None) -> None:
         """Replace the first len(records) records."""
         if len(records) > self.description.records or records.itemsize != self.description.stride:
             raise ValueError(f"{len(records)} records of {records.itemsize} bytes into a buffer of {self.description}")
+        data, before = records.tobytes(), self._held
+        self._held = data, None if versions is None else versions.tobytes()
         self.records, self.versions = records, versions
-        self.buffer.write(records.tobytes())
+        self.buffer.write(data)
+        if self._held != before:
+            self.version = new_version()
 
     def bind_uniform(self, binding: int, block: int) -> None:
         """Make block number `block` of the records visible as a uniform block."""

@@ -43,6 +43,11 @@ vec4 neighbour(Centre c, ivec2 other) {
     return same ? vec4(found.rgb, 1.0) : vec4(0.0);
 }
 
+int share_of(ivec2 pixel) {
+    ivec2 place = pixel % N;
+    return place.y * N + place.x;
+}
+
 void main() {
     Centre c;
     c.pixel = ivec2(gl_FragCoord.xy);
@@ -62,9 +67,9 @@ void main() {
     uvec2 found = uvec2(0u);  // a bit for each share
     for (int y = 0; y < N; ++y)
         for (int x = 0; x < N; ++x) {
-            ivec2 other = corner + ivec2(x, y), block = other % N;
+            ivec2 other = corner + ivec2(x, y);
             vec4 one = neighbour(c, other);
-            int share = block.y * N + block.x;
+            int share = share_of(other);
             sum += one;
             found[share >> 5] |= uint(one.a) << (share & 31);
         }
@@ -95,10 +100,10 @@ void main() {
     int taps = sum.a < float(SHARES) ? SHARES : 0;
     for (int tap = 0; tap < taps; ++tap) {
         ivec2 other = corner + ivec2(tap % N, tap / N), turn = N - 2 * N * ivec2(greaterThanEqual(other, c.pixel));
-        if (neighbour(c, other).a > 0.0) continue;
-        vec4 one = neighbour(c, other + ivec2(turn.x, 0));
-        if (one.a == 0.0) one = neighbour(c, other + ivec2(0, turn.y));
-        if (one.a == 0.0) one = neighbour(c, other + turn);
+        int share = share_of(other), tries = (found[share >> 5] >> (share & 31) & 1u) == 1u ? 0 : 3;
+        vec4 one = vec4(0.0);
+        for (int i = 0; i < tries && one.a == 0.0; ++i)  // to the other side in x, in y, in both
+            one = neighbour(c, other + turn * ivec2(i != 1, i != 0));
         sum += one;
     }
     irradiance.rgb = sum.rgb / sum.a;

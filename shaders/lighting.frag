@@ -19,7 +19,7 @@ layout(binding = UNIT_THIN) uniform sampler2D thin;
 layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
 #endif
 uniform int first;  // light of this block to start with; 1 where light 0 is the spotlight
-uniform int count;  // lights of this block
+uniform int count;  // lights of this block, where they are not in `indirect` already
 
 in vec2 ndc;
 layout(location = 0) out vec4 radiance;
@@ -47,11 +47,13 @@ void main() {
 #if HAS_THIN
     irradiance += texelFetch(thin, pixel, 0).rgb;
 #endif
-#elif HAS_NEAR_FIELD
+#else
+#if HAS_NEAR_FIELD
     if (first == 1) irradiance += texelFetch(near_field, pixel, 0).rgb;
 #endif
     for (int i = first; i < count; ++i)
         irradiance += vpl_irradiance(lights[i], position, normal, shading_normal)
                     * VPL_VISIBILITY(lights[i]);
+#endif
     radiance = vec4(texelFetch(albedo, pixel, 0).rgb * irradiance * INVERSE_PI, 1.0);
 }

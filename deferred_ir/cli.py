@@ -53,39 +53,7 @@ def _parser() -> Parser:
         return added
 
     render = command("render", _render, "Render a scene to images.")
-    render.add_argument("scene", metavar="SCENE", help="a built-in scene, a scene file (.toml) or a model")
-    render.add_argument(
-        "-o",
-        "--output",
-        action="append",
-        default=[],
-        metavar="OUT",
-        help="image: .png, .exr or .npy (%%04d: the frame); may be repeated",
-    )
-    render.add_argument("--graph", metavar="NAME|FILE", help="render graph (default: deferred)")
-    render.add_argument("--size", metavar="WxH", help="pixels (default: 512x512)")
-    render.add_argument("--vpls", type=_count, metavar="N", help="virtual point lights (default: 64)")
-    render.add_argument("--seed", type=_count, metavar="N", help="of the samples (default: 0)")
-    render.add_argument("--device", default="auto", metavar="D", help="see `deferred-ir devices` (default: auto)")
-    render.add_argument(
-        "--frames",
-        type=_positive,
-        default=1,
-        metavar="N",
-        help="frame i shows time i/30 s",
-    )
-    render.add_argument(
-        "--accumulate",
-        type=_positive,
-        default=1,
-        metavar="K",
-        help="average K frames of fresh samples in each image; Ctrl-C keeps what is done",
-    )
-    render.add_argument(
-        "--reuse", action="store_true", help="run a pass only if something has changed that its outputs are made of"
-    )
-    render.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
-    render.add_argument("--json", metavar="RUN.json", help="write what was rendered, and how long it took")
+    _add_render_options(render)
 
     compare = command("compare", _compare, "Measure how far an image is from its reference: relMSE, RMSE, bias, FLIP.")
     compare.add_argument("image", metavar="A", help="linear image: .npy or .exr")
@@ -135,6 +103,47 @@ def _parser() -> Parser:
     doctor.add_argument("--device", default="auto", metavar="D", help="the device to check (default: auto)")
     command("devices", _devices, "List the devices that OpenGL can run on.")
     return parser
+
+
+def _add_render_options(render: Parser) -> None:
+    render.add_argument("scene", metavar="SCENE", help="a built-in scene, a scene file (.toml) or a model")
+    render.add_argument(
+        "-o",
+        "--output",
+        action="append",
+        default=[],
+        metavar="OUT",
+        help="image: .png, .exr or .npy (%%04d: the frame); may be repeated",
+    )
+    render.add_argument("--graph", metavar="NAME|FILE", help="render graph (default: deferred)")
+    render.add_argument("--size", metavar="WxH", help="pixels (default: 512x512)")
+    render.add_argument("--vpls", type=_count, metavar="N", help="virtual point lights (default: 64)")
+    render.add_argument("--seed", type=_count, metavar="N", help="of the samples (default: 0)")
+    render.add_argument("--device", default="auto", metavar="D", help="see `deferred-ir devices` (default: auto)")
+    render.add_argument(
+        "--frames",
+        type=_positive,
+        default=1,
+        metavar="N",
+        help="frame i shows time i/30 s",
+    )
+    render.add_argument(
+        "--accumulate",
+        type=_positive,
+        default=1,
+        metavar="K",
+        help="average K frames of fresh samples in each image; Ctrl-C keeps what is done",
+    )
+    render.add_argument(
+        "--reuse", action="store_true", help="run a pass only if something has changed that its outputs are made of"
+    )
+    render.add_argument(
+        "--keep-all",
+        action="store_true",
+        help="leave nothing out that this scene does not need; the pixels are the same",
+    )
+    render.add_argument("--set", action="append", default=[], metavar="PASS.PARAM=VALUE", help=SET_HELP)
+    render.add_argument("--json", metavar="RUN.json", help="write what was rendered, and how long it took")
 
 
 def _add_profile_options(profile: Parser) -> None:

@@ -15,11 +15,14 @@ OCTAVES = 10
 ROUNDING = 2.0**-18
 """Slack of the test against a plane, relative to the terms it adds: 64 roundings, this test's and the shader's."""
 
+EVERY = slice(None)
+
 
 class Clusters:
     """Faces (F, 3) of `positions` (V, 3), grouped by where they are, and by `groups` (F,) if these are given.
 
     order: int (F,), the faces of cluster 0, then of cluster 1, ... starts: int (C + 1,), where in `order` each begins.
+    reach: largest coordinate, without its sign.
     """
 
     def __init__(self, positions: Array, faces: Ints, most: int = CLUSTER, groups: Ints | None = None) -> None:
@@ -35,7 +38,7 @@ class Clusters:
         low, high = np.minimum.reduceat(low[self.order], first), np.maximum.reduceat(high[self.order], first)
         centre = low / 2 + high / 2
         half = np.maximum(high - centre, centre - low)
-        self._reach = np.abs([low, high]).max()
+        self.reach = float(np.abs([low, high]).max())
         self._longest = np.maximum.reduceat(edges[self.order], first)
         self._boxes = np.concatenate([centre, half, np.ones((len(first), 1), np.float32)], axis=1).T.copy()
 
@@ -47,24 +50,30 @@ class Clusters:
         """Triangles of each cluster, int (C,)."""
         return np.diff(self.starts)
 
-    def visible(self, lights: np.ndarray, *, hemisphere: bool = False) -> Bools:
-        """Which clusters may show in the maps of `lights`, LIGHT records (n,): bool (n, C).
+    def visible(
+        self, lights: np.ndarray, *, hemisphere: bool = False, margin: float = 0.0, only: Ints | slice = EVERY
+    ) -> Bools:
+        """Which clusters may show in the maps of `lights`, LIGHT records (n,): bool (n, C), or of those in `only`.
 
         A map shows what lies inside its pyramid; with `hemisphere` all that is in front of the light. A cluster that is
-        left out lies outside by more than roundings can move it, so its triangles would have covered no texel.
+        left out lies outside by `margin` and more than roundings can move it, so its triangles would have covered no
+        texel.
         """
-        if len(self) == 1:
+        if len(self) == 1 and margin == 0:
             return np.ones((len(lights), 1), bool)
         x, y, z = (lights[axis] for axis in ("x_axis", "y_axis", "z_axis"))
         position = lights["position"]
         # What the dot products here and in the shader add up is no larger than this.
-        terms = (np.abs(x) + np.abs(y) + np.abs(z)).sum(axis=1) * (self._reach + np.abs(position).max(axis=1))
+        terms = (np.abs(x) + np.abs(y) + np.abs(z)).sum(axis=1) * (self.reach + np.abs(position).max(axis=1))
         slack = terms * np.float32(ROUNDING)
-        outside = np.zeros((len(lights), len(self)), bool)
+        boxes = self._boxes[:, only]
+        outside = np.zeros((len(lights), boxes.shape[1]), bool)
         for normal in (z,) if hemisphere else (z, z + x, z - x, z + y, z - y):
             offset = slack - (normal * position).sum(axis=1)
+            if margin > 0:
+                offset += np.float32(margin) * np.linalg.norm(normal, axis=1)
             # The corner of the box that is farthest along the normal decides.
-            outside |= np.column_stack([normal, np.abs(normal), offset]) @ self._boxes < 0
+            outside |= np.column_stack([normal, np.abs(normal), offset]) @ boxes < 0
         return ~outside
 
     def drawn(self, lights: np.ndarray) -> Bools:

@@ -10,7 +10,7 @@ Ideas: pure reflection (Falcor), descriptions derived from inputs (kajiya).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -79,12 +79,14 @@ class Output:
     """A port that writes. `defines` tell the readers' shaders what they must know of the writer (layout, encoding).
 
     `attach` False: a texture that shaders store into wherever they like, instead of a target of the pass's framebuffer.
+    `spare`: the pass can do without it, and does where nothing reads it; its shader asks for `TARGET_<PORT>`.
     """
 
     doc: str
     description: Description
     defines: Mapping[str, int | float] = field(default_factory=dict)
     attach: bool = True
+    spare: bool = False
 
 
 NO_PORTS: Mapping[str, Any] = {}
@@ -99,6 +101,9 @@ class Facts:
     emits: bool = True
     """The spotlight has power."""
 
+    vpls: bool = True
+    """VPLs may shine."""
+
     clamped: bool = True
     """VPLs light what is near them with less than they should."""
 
@@ -110,6 +115,14 @@ class Facts:
 
     software: bool = True
     """OpenGL draws on the CPU."""
+
+    keep_all: bool = False
+    """Nothing is left out that another scene would need."""
+
+    @property
+    def kept(self) -> Facts:
+        """With `keep_all` those of a scene that needs every pass."""
+        return replace(self, emits=True, vpls=True, clamped=True) if self.keep_all else self
 
 
 class Pass:

@@ -50,6 +50,8 @@ class Io:
                 self.defines |= written[source]
         for output in step.outputs.values():
             self.defines |= output.defines
+        drawn = [name for name, output in step.outputs.items() if output.attach and _colour(ports[name])]
+        self.defines |= {f"TARGET_{name.upper()}": i for i, name in enumerate(drawn)}
 
     def __getitem__(self, port: str) -> Any:
         if port not in self._ports:
@@ -101,6 +103,10 @@ class Io:
     def repeat(self) -> None:
         """Let the next frame run the pass in any case: what it keeps from frame to frame has not come to rest."""
         self.again = True
+
+
+def _colour(resource: Resource | None) -> bool:
+    return isinstance(resource, GpuTexture) and not resource.format.depth
 
 
 class FullscreenPass(Pass):

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from .dropping import shining
 from .gl.resources import GpuTexture
 from .io import Io
 from .maps import MapParams
@@ -19,13 +20,14 @@ class KeptMaps:
     """What an atlas holds. Place 0 is the spotlight's layer, place 1 + t tile t of the VPLs.
 
     params: with which it was drawn. places, versions: int (n,), of the lights of the frame; no versions: every map is
-    drawn in every frame. dirty: bool (n,), which of them must be drawn. held: int (all places,), the version of the
-    light whose map is in each place, 0 for none.
+    drawn in every frame. shining: bool (n,), which of them have power, and so need a map. dirty: bool (n,), which must
+    be drawn. held: int (all places,), the version of the light whose map is in each place, 0 for none.
     """
 
     params: MapParams
     places: Ints
     versions: Ints | None
+    shining: Bools
     dirty: Bools
     held: Ints
 
@@ -34,15 +36,15 @@ class KeptMaps:
         """For the frame at hand: clears the places of lights that must be drawn, or the whole atlas."""
         atlas, lights = io["atlas"], io["lights"]
         places = lights.records["tile"].astype(int) + 1
-        versions = lights.versions
+        versions, lit = lights.versions, shining(lights.records)
         before: KeptMaps | None = atlas.kept
         if versions is not None and before and before.versions is not None and before.params == params:
-            kept = cls(params, places, versions, before.held[places] != versions, before.held)
+            kept = cls(params, places, versions, lit, lit & (before.held[places] != versions), before.held)
             kept.clear(atlas)
         else:
             io.framebuffer.clear_depth()
             tiles = (atlas.description.layers - 1) * (atlas.size[0] // params.vpl_size) ** 2
-            kept = cls(params, places, versions, np.ones(len(places), bool), np.zeros(1 + tiles, np.int64))
+            kept = cls(params, places, versions, lit, lit, np.zeros(1 + tiles, np.int64))
         atlas.kept = kept
         return kept
 
@@ -60,15 +62,18 @@ class KeptMaps:
     def remember(self) -> None:
         """They are drawn."""
         if self.versions is not None:
-            self.held[self.places] = self.versions
+            self.held[self.places[self.dirty]] = self.versions[self.dirty]
 
     def told(self, parts: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
         """Of `parts`, one for each place, those of the frame's lights, and whether their maps were drawn in it."""
-        if self.versions is None:
-            return [parts[place] for place in self.places]
-        return [
-            {**parts[place], "state": "dirty", "why": "its light is new, or has moved"}
-            if dirty
-            else {**parts[place], "state": "kept", "why": "its light stays"}
-            for place, dirty in zip(self.places, self.dirty, strict=True)
-        ]
+        told: list[Mapping[str, Any]] = []
+        for place, lit, dirty in zip(self.places, self.shining, self.dirty, strict=True):
+            if not lit:
+                told.append({**parts[place], "state": "left out", "why": "it lights nothing that is seen"})
+            elif self.versions is None:
+                told.append(parts[place])
+            elif dirty:
+                told.append({**parts[place], "state": "dirty", "why": "its light is new, or has moved"})
+            else:
+                told.append({**parts[place], "state": "kept", "why": "its light stays"})
+        return told

@@ -7,6 +7,7 @@ without a GPU (Filament).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 
 from .errors import GraphError, did_you_mean
@@ -25,7 +26,7 @@ def compile(graph: Graph, outputs: Sequence[str], facts: Facts = ANY_SCENE) -> P
     roots, edges = _resolve(graph, outputs, faults)
     for node in graph.nodes.values():
         facts = node.work.informed(facts)
-    unneeded = _leave_out(graph, edges, facts)
+    unneeded = _leave_out(graph, edges, facts.kept)
     for name, (source, _) in roots.items():
         if source in unneeded:
             faults.append(f"output '{name}' comes from {source}, which is left out: {unneeded[source]}")
@@ -35,6 +36,9 @@ def compile(graph: Graph, outputs: Sequence[str], facts: Facts = ANY_SCENE) -> P
         told = " ".join("; ".join(faults).split())  # a name may hold a line break
         raise GraphError(f"{graph.origin}: {told}")
     left_out = {name: unneeded.get(name, "no requested output needs it") for name in graph.nodes if name not in reached}
+    if not facts.keep_all:
+        steps, unread = _without_spare(steps, roots)
+        left_out |= unread
     return Plan(steps, roots, left_out, _lifetimes(steps, roots))
 
 
@@ -158,6 +162,17 @@ def _describe(graph: Graph, edges: Edges, order: list[str], faults: list[str]) -
             hint = did_you_mean(port, steps[source_name].outputs)
             faults.append(f"outputs.{name}: {source_name} has no output '{port}'{hint}")
     return tuple(steps.values())
+
+
+def _without_spare(steps: tuple[Step, ...], roots: Roots) -> tuple[tuple[Step, ...], dict[str, str]]:
+    """The steps without the outputs that nobody reads and their passes can do without, and which these were."""
+    read = {source for step in steps for source in step.sources.values() if source} | set(roots.values())
+    spare = {(s.name, port) for s in steps for port, output in s.outputs.items() if output.spare} - read
+    slim = tuple(
+        replace(s, outputs={port: output for port, output in s.outputs.items() if (s.name, port) not in spare})
+        for s in steps
+    )
+    return slim, {f"{name}.{port}": "nothing reads it" for name, port in sorted(spare)}
 
 
 def _lifetimes(steps: tuple[Step, ...], roots: Roots) -> dict[tuple[str, str], tuple[int, int]]:

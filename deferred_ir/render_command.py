@@ -46,6 +46,7 @@ def render(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
         arguments.device,
         set=chosen_settings(defaults, settings, arguments.vpls),
         reuse=arguments.reuse,
+        keep_all=arguments.keep_all,
     ) as renderer:
         print(f"OpenGL on {renderer.gpu.device}", file=sys.stderr)
         graph = renderer.graph()

@@ -39,7 +39,8 @@ class Renderer:
     size: (width, height) in pixels. graph: a built-in name or a graph file. device: see `deferred-ir devices`.
     set: parameters of passes, {"pass.param": value}. passes: pass classes of your own, {type name: class}, which a
     graph file then names. reuse: a pass runs only if something has changed that its outputs are made of; else every
-    frame redoes everything. window: its context, which is current, instead of a headless one on `device`.
+    frame redoes everything. keep_all: leave nothing out that this scene or view does not need; the pixels are the same.
+    window: its context, which is current, instead of a headless one on `device`.
 
     One context, one scene upload: render as often as you like, and close it (or use `with`). It belongs to the thread
     that made it.
@@ -54,12 +55,14 @@ class Renderer:
         set: Mapping[str, Any] | None = None,
         passes: Mapping[str, type[Pass]] | None = None,
         reuse: bool = False,
+        keep_all: bool = False,
         window: Loader | None = None,
     ) -> None:
         if not isinstance(size, Sequence) or len(size) != 2 or not all(isinstance(n, Integral) and n > 0 for n in size):
             raise SettingError(f"size {size!r}: wants two whole numbers above 0, width and height")
         self.size, self.reuse = (int(size[0]), int(size[1])), reuse
         self._graph_name, self._set, self._passes = graph, dict(set or {}), dict(passes or {})
+        self._keep_all = keep_all
         self._graphs: dict[int | None, Graph] = {}
         self._plans: dict[Any, Plan] = {}
         self.graph(None)  # a fault in the graph shows before a context is made
@@ -111,8 +114,13 @@ class Renderer:
         if not isinstance(scene, Scene):
             raise SettingError(f"scene: is {type(scene).__name__}, not a Scene; load it first: deferred_ir.load(...)")
         graph = self.graph(vpls)
-        known = replace(scene.facts, pixels=self.size[0] * self.size[1], software=self.gpu.device.kind == "software")
-        wanted = tuple(graph.outputs if outputs is None else outputs)
+        known = replace(
+            scene.facts,
+            pixels=self.size[0] * self.size[1],
+            software=self.gpu.device.kind == "software",
+            keep_all=self._keep_all,
+        )
+        wanted = tuple(graph.outputs if outputs is None or self._keep_all else outputs)
         key = (vpls, known, wanted)
         if key not in self._plans:
             plan = compile(graph, wanted, known)
@@ -158,7 +166,17 @@ class Renderer:
             self._upload(scene)
             assert self._buffers
             start = clock.perf_counter()
-            frame = Frame(self.size, scene.at(time).centred, self._buffers, self.tracer, seed, time, self.reuse)
+            now = scene.at(time).centred
+            frame = Frame(
+                self.size,
+                now,
+                self._buffers,
+                self.tracer,
+                seed,
+                time,
+                reuse=self.reuse,
+                by_view=not (self.reuse or self._keep_all),
+            )
             timers = self._timers if record else None
             with timers.frame() if timers else nullcontext():
                 self.executor.run(plan, frame, timers, steps=steps)

@@ -60,7 +60,14 @@ def _made_of(step: Step, io: Io, frame: Frame) -> tuple[Any, ...]:
         "time": frame.time,
     }
     named = tuple(parts[name] for name in sorted(step.work.depends()))
-    return type(step.work), step.work.params, tuple(io.defines.items()), _versions(io, step.work.inputs), named
+    return (
+        type(step.work),
+        step.work.params,
+        tuple(io.defines.items()),
+        _versions(io, step.work.inputs),
+        named,
+        frame.by_view,
+    )
 
 
 def _versions(io: Io, ports: Any) -> list[int]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Literal
 
 import numpy as np
 
 from .gl.resources import GpuBuffer
-from .graph import Buffer, Output
+from .graph import Buffer, Facts, Output
 from .lights import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
 from .params import param
 from .scene import Scene
@@ -39,6 +39,11 @@ class VplParams:
     def clamp_fraction(self) -> float:
         """The clamp distance in diagonals. auto: in proportion to the distance between VPLs, whose spikes it holds."""
         return AUTO_CLAMP / sqrt(max(self.count, 1)) if self.clamp == "auto" else self.clamp
+
+    def informed(self, facts: Facts) -> Facts:
+        """Whether there will be VPLs, and a clamp that holds them."""
+        vpls = self.count > 0 and facts.emits
+        return replace(facts, vpls=vpls, clamped=vpls and self.clamp_fraction > 0)
 
 
 def output(vpls: int, bounces: int = 1) -> Output:

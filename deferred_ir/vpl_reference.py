@@ -78,6 +78,8 @@ class Patch:
         """Irradiance by the VPLs `chosen`, times the squared diagonal, float64 (3, n)."""
         total = np.zeros(self.position.shape)
         for i in range(chosen.start, chosen.stop):
+            if not lights.emission[i].any():
+                continue
             way = self.position - lights.position[i][:, None]
             kernel = _kernel(
                 way, lights.normal[i], self.normal, self.shading_normal, edge=lights.edge, clamp=lights.clamp

@@ -6,15 +6,19 @@ from the vertices; nothing comes from a G-buffer.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
+from deferred_ir.dropping import in_order, shining
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
 from deferred_ir.io import Io
 from deferred_ir.lights import LIGHTS_PER_BLOCK, is_disc
 from deferred_ir.params import param
+from deferred_ir.typing import Ints
 
 FIRST_MAP = 1
 """Texture unit of the first depth map; unit 0 holds the primitives, FIRST_MAP + 1 the spotlight's once more."""
@@ -74,16 +78,24 @@ class Forward(Pass):
             )
         )
         program = io.program("forward.frag", "scene.vert", defines={"DIRECT": 0, "DISC": 0, **defines})
-        number = 1  # of the light; a group must not straddle two blocks
-        while number < len(lights.records):
-            block, first = divmod(number, LIGHTS_PER_BLOCK)
-            count = min(group, len(lights.records) - number, LIGHTS_PER_BLOCK - first)
-            for i, shadows in enumerate((io["vpls"] or [])[number - 1 : number - 1 + count]):
-                shadows.bind(FIRST_MAP + i, compare)
-            lights.bind_uniform(1, block)
-            program.set(first=first, count=count)
+        for rows in _groups(lights.records, group):
+            for i, tile in enumerate(lights.records["tile"][rows].astype(int) if io["vpls"] else ()):
+                io["vpls"][tile].bind(FIRST_MAP + i, compare)
+            lights.bind_uniform(1, int(rows[0]) // LIGHTS_PER_BLOCK)
+            numbers = np.resize(rows % LIGHTS_PER_BLOCK, group).tolist()
+            program.set(numbers=numbers if group > 1 else numbers[0], count=len(rows))
             frame.buffers.draw(program)
-            number += count
+
+
+def _groups(records: np.ndarray, size: int) -> Iterator[Ints]:
+    """Rows of the VPLs with power that each draw adds up, of LIGHT records (n,). No draw's are of two blocks."""
+    order, lit, number = in_order(records), shining(records), 1
+    while number < len(records):
+        count = min(size, LIGHTS_PER_BLOCK - number % LIGHTS_PER_BLOCK)
+        rows = order[number : number + count]
+        if lit[rows].any():
+            yield rows[lit[rows]]
+        number += count
 
 
 PASS = Forward

@@ -8,15 +8,21 @@ beside them.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, radians, sin
 from typing import ClassVar
 
+import numpy as np
+
+from deferred_ir.dropping import last_shining
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.interleaving import deal
 from deferred_ir.io import Io
 from deferred_ir.params import param
+from deferred_ir.typing import Ints
 
 IRRADIANCE, THIN, COUNT, MISSING = range(4)
 """Image units that the shaders declare."""
@@ -87,12 +93,24 @@ class Gather(Pass):
         program = io.program("thin.frag", "thin.vert")
         gpu.clip(1)  # to the rows that the list fills
         gpu.gl.ColorMask(0, 0, 0, 0)  # the shader stores where each pixel belongs
-        for start in range(0, len(vpls.records), vpls.description.block):
+        block = vpls.description.block
+        for start in range(0, len(vpls.records), block):
+            ranges = _ranges(vpls.records, shares, start, start + block)
+            if not ranges.any():
+                continue
             gpu.barrier()
-            vpls.bind_uniform(1, start // vpls.description.block)
-            program.set(start=start, total=len(vpls.records))
+            vpls.bind_uniform(1, start // block)
+            program.set(ranges=ranges.tolist())
             program.draw_fullscreen()
         gpu.barrier()
+
+
+def _ranges(vpls: np.ndarray, shares: int, start: int, stop: int) -> Ints:
+    """Where in the block from `start` to `stop` of VPLs, LIGHT records (n,), each share begins and ends, int (s, 2)."""
+    starts = np.clip(deal(len(vpls), round(shares**0.5))[1], start, stop)
+    ends = [first + last_shining(vpls[first:end]) for first, end in itertools.pairwise(starts)]
+    ranges: Ints = np.column_stack([starts[:-1], ends]) - start
+    return np.where((ranges[:, 1] > ranges[:, 0])[:, None], ranges, 0)
 
 
 PASS = Gather

@@ -16,11 +16,13 @@ class GBuffer(Pass):
     """Depth, normals and reflectance of the nearest surface in each pixel."""
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Three targets of the frame's size."""
+        """Three targets of the frame's size, or fewer."""
         del inputs
         return {
-            "normals": Output("shading and geometric normal, octahedral, towards the viewer", Texture("rgba16")),
-            "albedo": Output("reflectance, linear RGB; alpha 1 on surfaces", Texture("rgba16f")),
+            "normals": Output(
+                "shading and geometric normal, octahedral, towards the viewer", Texture("rgba16"), spare=True
+            ),
+            "albedo": Output("reflectance, linear RGB; alpha 1 on surfaces", Texture("rgba16f"), spare=True),
             "depth": Output("reversed depth, near/z; 0 is the background", Texture("depth32f")),
         }
 
@@ -30,8 +32,8 @@ class GBuffer(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Draw all triangles."""
-        io.framebuffer.clear_color(0)
-        io.framebuffer.clear_color(1)
+        for target in range(len(io.framebuffer.colors)):
+            io.framebuffer.clear_color(target)
         io.framebuffer.clear_depth()
         ctx = io.gpu.ctx
         ctx.enable(ctx.DEPTH_TEST)

@@ -8,7 +8,7 @@ spotlight is turned off.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -43,8 +43,9 @@ class IncrementalVpl(Pass):
         return {"lights": output(self.params.count)}
 
     def informed(self, facts: Facts) -> Facts:
-        """Whether there is a clamp, and anything to clamp."""
-        return replace(facts, clamped=self.params.clamp_fraction > 0 and self.params.count > 0)
+        """Whether there will be VPLs, and a clamp."""
+        informed: Facts = self.params.informed(facts)
+        return informed
 
     def depends(self) -> frozenset[str]:
         """Where the light falls."""

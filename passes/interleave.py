@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+
+from deferred_ir.dropping import in_order, shining_first
 from deferred_ir.errors import GraphError
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass
@@ -54,10 +57,13 @@ class Interleave(Pass):
         return frozenset()
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Shuffle and upload."""
+        """Shuffle and upload, those without power last in each part of a share that one draw adds up."""
         del frame
-        vpls = io["lights"].records[1:]
-        io["vpls"].write(vpls[deal(len(vpls), self.params.n)[0]])
+        lights = io["lights"].records
+        vpls = lights[in_order(lights)[1:]]
+        order, starts = deal(len(vpls), self.params.n)
+        parts = np.union1d(starts, np.arange(0, len(vpls), io["vpls"].description.block))
+        io["vpls"].write(shining_first(vpls[order], parts))
 
 
 PASS = Interleave

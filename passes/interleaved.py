@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from deferred_ir.dropping import last_shining
 from deferred_ir.frame import Frame
-from deferred_ir.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.graph import Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.interleaving import deal, sub_buffers
 from deferred_ir.io import Io
 
@@ -36,6 +37,10 @@ class Interleaved(Pass):
         """Positions come back from the depth."""
         return frozenset({"camera"})
 
+    def unneeded(self, facts: Facts) -> str | None:
+        """Without VPLs there is no light to share."""
+        return None if facts.vpls else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
+
     def execute(self, frame: Frame, io: Io) -> None:
         """A draw for each share, or more where it crosses from block to block of the buffer."""
         vpls, n = io["vpls"], int(io.defines["INTERLEAVE"])
@@ -51,8 +56,12 @@ class Interleaved(Pass):
             # An empty share is drawn as well: the filter counts its pixels.
             for number in range(start // block, max(stop - 1, start) // block + 1):
                 vpls.bind_uniform(1, number)
-                first, end = max(start - number * block, 0), min(stop - number * block, block)
-                program.set(share=(share % n, share // n), begins=first + number * block == start, first=first, end=end)
+                first, end = max(start, number * block), min(stop, (number + 1) * block)
+                begins, count = first == start, last_shining(vpls.records[first:end])
+                if not begins and not count:
+                    continue
+                first -= number * block
+                program.set(share=(share % n, share // n), begins=begins, first=first, end=first + count)
                 if io["rays"]:
                     program.set(before=number * block - start)
                 program.draw_fullscreen()

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from deferred_ir.dropping import last_shining
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
 from deferred_ir.io import Io
@@ -48,8 +49,12 @@ class Lighting(Pass):
         ctx.blend_func = ctx.ONE, ctx.ONE
         total = 1 if io["indirect"] else len(lights.records)
         for start in range(0, total, LIGHTS_PER_BLOCK):
+            first = int(start == 0)
+            count = last_shining(lights.records[start + first : min(start + LIGHTS_PER_BLOCK, total)])
+            if not first and not count:
+                continue
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
-            program.set(first=int(start == 0), count=min(LIGHTS_PER_BLOCK, total - start))
+            program.set(first=first, count=first + count)
             program.draw_fullscreen()
             ctx.enable(ctx.BLEND)
 

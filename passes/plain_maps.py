@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from deferred_ir import map_meshes, paraboloid_maps
+from deferred_ir.dropping import shining
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.io import Io
@@ -31,9 +32,8 @@ class PlainMaps(Pass):
         single, room = 4 * p.vpl_size**2, p.budget * 2**20 - 4 * p.spot_size**2
         p.check_budget(count - 1, 4 * p.spot_size**2 + (count - 1) * single, room // single)
         spot = Texture("depth32f", size=(p.spot_size, p.spot_size), copies=1, mend="a smaller shadow_maps.spot_size")
-        vpls = Texture(
-            "depth32f", (p.vpl_size, p.vpl_size), copies=max(count - 1, 1), mend="a smaller shadow_maps.vpl_size"
-        )
+        edge = p.vpl_size if count > 1 else 1
+        vpls = Texture("depth32f", (edge, edge), copies=max(count - 1, 1), mend="a smaller shadow_maps.vpl_size")
         return {
             "spot": Output("reversed depth from the spotlight", spot, p.defines()),
             "vpls": Output("reversed depth from each VPL", vpls, p.defines()),
@@ -51,19 +51,19 @@ class PlainMaps(Pass):
         """Draw all triangles for each light."""
         self.params.prepare(io.gpu)
         program = io.program("depth.frag", "plain_maps.vert")
-        total = len(io["lights"].records)
-        curved = self.params.paraboloid(io["lights"].records)
-        for i, texture in enumerate([*io["spot"], *io["vpls"]][:total]):
+        lights, textures = io["lights"], [*io["spot"], *io["vpls"]]
+        curved = self.params.paraboloid(lights.records)
+        drawn = np.flatnonzero(shining(lights.records))
+        for i in drawn.tolist():
             block, number = divmod(i, LIGHTS_PER_BLOCK)
-            if number == 0:
-                io["lights"].bind_uniform(1, block)
-            framebuffer = texture.framebuffer
+            lights.bind_uniform(1, block)
+            framebuffer = textures[int(lights.records["tile"][i]) + 1].framebuffer
             framebuffer.bind()
             framebuffer.clear_depth()
             own = frame.buffers.cluster_buffers
             mesh = map_meshes.of_vpls(frame, self.params) if i else own
             if curved[i]:
-                records = io["lights"].records[block * LIGHTS_PER_BLOCK :][:LIGHTS_PER_BLOCK]
+                records = lights.records[block * LIGHTS_PER_BLOCK :][:LIGHTS_PER_BLOCK]
                 only = np.arange(len(records)) == number
                 paraboloid_maps.draw(mesh, io, self.params, records, only, layered=False)
             else:
@@ -71,9 +71,9 @@ class PlainMaps(Pass):
                 if mesh is own:
                     frame.buffers.draw(program)
                 else:
-                    mesh.draw_all(program, io["lights"].records[i : i + 1])
-        io.count("maps_drawn", total)
-        if total > 1:
+                    mesh.draw_all(program, lights.records[i : i + 1])
+        io.count("maps_drawn", len(drawn))
+        if drawn.any():
             map_meshes.count(frame, io, self.params)
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from deferred_ir.dropping import dropped, shining
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Facts, Output, Pass
 from deferred_ir.io import Io
@@ -44,8 +45,9 @@ class Vpl(Pass):
         return {"lights": output(self.params.count * self.params.bounces, self.params.bounces)}
 
     def informed(self, facts: Facts) -> Facts:
-        """Whether there is a clamp, and anything to clamp."""
-        return replace(facts, clamped=self.params.clamp_fraction > 0 and self.params.count > 0)
+        """Whether there will be VPLs, and a clamp."""
+        informed: Facts = self.params.informed(facts)
+        return informed
 
     def depends(self) -> frozenset[str]:
         """Where the light falls, and for a choice among candidates what the camera sees."""
@@ -56,6 +58,9 @@ class Vpl(Pass):
         light, p = frame.scene.spotlight, self.params
         vpls = self._cast(frame) if p.count > 0 and any(light.emission) else NONE
         records, lights = packed(frame.scene, vpls, p, np.arange(len(vpls))), io["lights"]
+        if frame.by_view and any(light.emission):
+            records = dropped(records, frame.buffers.clusters, frame.scene.camera, frame.size)
+            io.count("lights_dropped", int((~shining(records)).sum()))
         lights.write(records, map_versions(lights, records, frame.scene) if frame.reuse else None)
         io.state("vpls_alive", len(vpls))
 

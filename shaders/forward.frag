@@ -17,8 +17,8 @@ layout(binding = UNIT_BLOCKERS) uniform sampler2D blockers;
 layout(binding = UNIT_MAPS) uniform sampler2DShadow vpls[LIGHTS_PER_DRAW];
 #endif
 #if !DIRECT
-uniform int first;  // of this draw, in this block
-uniform int count;  // lights of this draw
+uniform int numbers[LIGHTS_PER_DRAW];  // of this draw's lights, in this block
+uniform int count;
 #endif
 
 layout(location = 0) out vec4 radiance;
@@ -37,9 +37,9 @@ void main() {
 #else
     for (int i = 0; i < LIGHTS_PER_DRAW; ++i) {
         if (i >= count) break;
-        vec3 arriving = vpl_irradiance(lights[first + i], s.position, s.normal, s.shading_normal);
+        vec3 arriving = vpl_irradiance(lights[numbers[i]], s.position, s.normal, s.shading_normal);
 #if HAS_VPLS
-        arriving *= vpl_visibility(vpls[i], lights[first + i], s.position, s.normal);
+        arriving *= vpl_visibility(vpls[i], lights[numbers[i]], s.position, s.normal);
 #endif
         irradiance += arriving;
     }

@@ -8,8 +8,7 @@
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 layout(binding = 0, rgba32f) uniform image2D irradiance;
-uniform int start;  // number of the block's first VPL
-uniform int total;  // of all VPLs
+uniform ivec2 ranges[INTERLEAVE * INTERLEAVE];  // where in the block the VPLs of each share begin and end
 
 void main() {
     ivec2 place = ivec2(gl_FragCoord.xy), size = textureSize(depth, 0);
@@ -22,10 +21,9 @@ void main() {
     uvec2 bits = imageLoad(missing, place).rg;
     const int shares = INTERLEAVE * INTERLEAVE;
     for (int share = 0; share < shares; ++share) {
-        int first = share * total / shares, last = (share + 1) * total / shares;  // deferred_ir/interleaving.py deals so
         bool wanted = ((bits[share >> 5] >> (share & 31)) & 1u) == 1u;
-        int end = wanted ? min(last - start, LIGHTS_PER_BLOCK) : 0;  // nothing is looped over where no pixel wants it
-        for (int i = max(first - start, 0); i < end; ++i)
+        int end = wanted ? ranges[share].y : 0;  // nothing is looped over where no pixel wants it
+        for (int i = ranges[share].x; i < end; ++i)
             sum += vpl_irradiance(lights[i], position, normal, shading_normal) * VPL_VISIBILITY(lights[i]);
     }
     imageStore(irradiance, pixel, imageLoad(irradiance, pixel) + vec4(sum, 0.0));

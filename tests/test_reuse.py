@@ -187,7 +187,7 @@ class WatchedScene:
 @pytest.mark.parametrize("graph", [*GRAPHS, "accurate by rays"])
 def test_passes_name_all_that_they_read(renderer, graph):
     name, *rays = graph.split(" by ")
-    one = renderer(SIZE, name, set={**SETTINGS, **(RAYS if rays else {})})
+    one = renderer(SIZE, name, set={**SETTINGS, **(RAYS if rays else {})}, reuse=True)
     plan = one.plan(ROOM)
     for step in plan.steps:
         execute = step.work.execute

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -68,13 +69,18 @@ class SceneBuffers:
         """Under what programs keep vertex arrays for this scene."""
         return [self, *self._clustered.values()]
 
+    @cached_property
+    def clusters(self) -> Clusters:
+        """The scene's triangles in clusters, on the CPU."""
+        return Clusters(self._scene.geometry.positions, self._scene.geometry.faces)
+
     @property
     def cluster_buffers(self) -> ClusterBuffers:
         """The scene's triangles in clusters, made when first drawn so."""
         if OWN not in self._clustered:
             g = self._scene.geometry
             uploaded = self._attributes["position"][0]
-            self._clustered[OWN] = ClusterBuffers(self.gpu, Clusters(g.positions, g.faces), g.faces, uploaded)
+            self._clustered[OWN] = ClusterBuffers(self.gpu, self.clusters, g.faces, uploaded)
         return self._clustered[OWN]
 
     def stand_in(

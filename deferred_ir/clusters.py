@@ -50,17 +50,20 @@ class Clusters:
         """Triangles of each cluster, int (C,)."""
         return np.diff(self.starts)
 
-    def visible(
-        self, lights: np.ndarray, *, hemisphere: bool = False, margin: float = 0.0, only: Ints | slice = EVERY
-    ) -> Bools:
-        """Which clusters may show in the maps of `lights`, LIGHT records (n,): bool (n, C), or of those in `only`.
+    def visible(self, lights: np.ndarray, *, hemisphere: bool = False) -> Bools:
+        """Which clusters may show in the maps of `lights`, LIGHT records (n,): bool (n, C).
 
         A map shows what lies inside its pyramid; with `hemisphere` all that is in front of the light. A cluster that is
-        left out lies outside by `margin` and more than roundings can move it, so its triangles would have covered no
-        texel.
+        left out lies outside by more than roundings can move it, so its triangles would have covered no texel.
         """
-        if len(self) == 1 and margin == 0:
+        if len(self) == 1:
             return np.ones((len(lights), 1), bool)
+        return self.within(lights, hemisphere=hemisphere)
+
+    def within(
+        self, lights: np.ndarray, *, hemisphere: bool = False, margin: float = 0.0, only: Ints | slice = EVERY
+    ) -> Bools:
+        """Which clusters, or which of `only`, may lie in the lights' pyramids or less than `margin` outside: (n, C)."""
         x, y, z = (lights[axis] for axis in ("x_axis", "y_axis", "z_axis"))
         position = lights["position"]
         # What the dot products here and in the shader add up is no larger than this.

@@ -77,7 +77,7 @@ class Gather(Pass):
         for unit, name in ((IRRADIANCE, "irradiance"), (THIN, "thin"), (COUNT, "count"), (MISSING, "missing")):
             io[name].bind_image(unit)
         io["count"].upload([[0]])
-        angle, shares = radians(self.params.angle), io.defines["INTERLEAVE"] ** 2
+        angle, shares = radians(self.params.angle), int(io.defines["INTERLEAVE"]) ** 2
         program = io.program("gather.frag")
         program.set(
             cosine_squared=cos(angle) ** 2,

@@ -24,7 +24,7 @@ demo: $(VENV)/installed  ## install, render the Cornell box to out/cornell.png
 test: lint types  ## install, check style and types, run all tests
 	@$(BIN)/python tools/system.py opengl
 	@$(BIN)/python tools/system.py display
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest -n auto --maxprocesses 8 --dist loadfile
 
 pictures: $(VENV)/installed-dev  ## render the pictures of README and docs again
 	@$(BIN)/python tools/system.py display

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Container
-from typing import Any
+from typing import Any, Protocol
 
 from .errors import DeviceError
 from .frame import FRAME, Frame
@@ -21,6 +21,16 @@ from .io import Io, Resource
 from .reuse import Runs
 
 FRAME_BLOCK = 0
+
+
+class Watch(Protocol):
+    """Who looks at each pass's ports before and after it runs."""
+
+    def begin(self, step: Step, io: Io) -> None:
+        """Before."""
+
+    def end(self, step: Step, io: Io) -> None:
+        """After."""
 
 
 class Executor:
@@ -38,6 +48,7 @@ class Executor:
         self._ios: list[Io] = []
         self._runs = Runs()
         self.kept: tuple[str, ...] = ()
+        self.watch: Watch | None = None
 
     def run(
         self, plan: Plan, frame: Frame, timers: Timers | None = None, *, steps: Container[str] | None = None
@@ -62,11 +73,16 @@ class Executor:
                 kept.append(step.name)
                 continue
             self._runs.forget(step)
+            if self.watch:
+                self.watch.begin(step, io)
             self.gpu.reset()
             io.begin()
             if timers:
                 timers.mark(step.name)
             step.work.execute(frame, io)
+            self.gpu.check(step.name)
+            if self.watch:
+                self.watch.end(step, io)
             for port in step.outputs:
                 _touch(io[port])
             self._runs.remember(step, io, frame)

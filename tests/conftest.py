@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import hypothesis
 import pytest
 
+from deferred_ir.gl.debug import SWITCH
 from deferred_ir.gl.gpu import Gpu
 from deferred_ir.renderer import Renderer
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("LP_NUM_THREADS", "1")  # llvmpipe: every core has a process of tests already
+os.environ[SWITCH] = "1"  # OpenGL's complaints are errors, in every process that tests start
 
 # The same examples in every run, and no clocks: a busy machine must not fail a test.
 hypothesis.settings.register_profile("project", deadline=None, derandomize=True)
@@ -28,8 +34,9 @@ def gpu(software_gpu: Gpu) -> Iterator[Gpu]:
     """The software device, current; OpenGL has no error before and after the test."""
     with software_gpu.ctx:
         software_gpu.reset()
-        assert software_gpu.ctx.error == "GL_NO_ERROR"
+        software_gpu.check("before")
         yield software_gpu
+        software_gpu.check("after")
         assert software_gpu.ctx.error == "GL_NO_ERROR"
 
 
@@ -39,6 +46,7 @@ def renderer() -> Iterator[Callable[..., Renderer]]:
     made: list[Renderer] = []
 
     def clean(one: Renderer) -> None:
+        one.gpu.check("test")
         with one.gpu.ctx:
             assert one.gpu.ctx.error == "GL_NO_ERROR"
 

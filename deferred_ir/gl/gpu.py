@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from functools import cached_property
 from typing import Any
 
 from . import devices, raw
+from .debug import SWITCH, DebugOutput
 from .devices import Loader
 
 
@@ -20,6 +22,8 @@ class Gpu:
         opened = devices.create_context(device) if window is None else devices.adopt(window)
         self.ctx, self._loader, self.device = opened
         self.gl = raw.GL(self._loader)
+        if os.environ.get(SWITCH):
+            self.gl.debug = DebugOutput(self.ctx, self.gl)
         extensions = self.ctx.extensions
         self.layer_from_vertex = "GL_ARB_shader_viewport_layer_array" in extensions
         self.clip_control = "GL_ARB_clip_control" in extensions or self.ctx.version_code >= 450
@@ -69,6 +73,11 @@ class Gpu:
             raw.IMAGE_ACCESS_BARRIER | raw.TEXTURE_FETCH_BARRIER | raw.TEXTURE_UPDATE_BARRIER | raw.FRAMEBUFFER_BARRIER
         )
 
+    def check(self, where: str) -> None:
+        """With debug output on (DEFERRED_IR_DEBUG): raise DeviceError if OpenGL has complained."""
+        if self.gl.debug:
+            self.gl.debug.check(where)
+
     def clip(self, count: int) -> None:
         """Clip by the first `count` of gl_ClipDistance, and by no other."""
         for side in range(min(count, self._clipped), max(count, self._clipped)):
@@ -77,10 +86,15 @@ class Gpu:
 
     def close(self) -> None:
         """Destroy the context and all that lives in it; a window's own is left to the window."""
+        debug, self.gl.debug = self.gl.debug, None
         with self.ctx:  # names mean something else in whichever context is current
             for sampler in self._samplers.values():
                 sampler.release()
+            if debug:
+                debug.close()
         if self._headless:
             devices.close(self.ctx, self._loader)
         else:
             self.ctx.release()
+        if debug:
+            debug.check("closing")

@@ -5,10 +5,13 @@ from __future__ import annotations
 import ctypes
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import DeviceError
 from .devices import Loader
+
+if TYPE_CHECKING:
+    from .debug import DebugOutput
 
 _U, _I, _F, _P = ctypes.c_uint, ctypes.c_int, ctypes.c_float, ctypes.c_void_p
 _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
@@ -22,6 +25,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "ClearTexSubImage": (None, _U, *[_I] * 7, _U, _U, _P),
     "ClipControl": (None, _U, _U),
     "ColorMask": (None, _I, _I, _I, _I),
+    "DebugMessageCallback": (None, _P, _P),
     "DeleteFramebuffers": (None, _I, _P),
     "DeleteQueries": (None, _I, _P),
     "DeleteTextures": (None, _I, _P),
@@ -58,6 +62,9 @@ MAX_TEXTURE_SIZE, MAX_ARRAY_LAYERS, MAX_VIEWPORT_DIMS = 0x0D33, 0x88FF, 0x0D3A
 READ_WRITE = 0x88BA
 TEXTURE_FETCH_BARRIER, IMAGE_ACCESS_BARRIER, TEXTURE_UPDATE_BARRIER, FRAMEBUFFER_BARRIER = 0x8, 0x20, 0x100, 0x400
 OUT_OF_MEMORY = 0x0505
+DEBUG_OUTPUT, DEBUG_OUTPUT_SYNCHRONOUS, DEBUG_SOURCE_API = 0x92E0, 0x8242, 0x8246
+DEBUG_FAULTS = 0x824C, 0x824D, 0x824E
+"""Types of messages: errors, deprecated and undefined behaviour."""
 
 
 class GL:
@@ -65,6 +72,7 @@ class GL:
 
     def __init__(self, loader: Loader) -> None:
         self._loader = loader
+        self.debug: DebugOutput | None = None
         if sys.platform == "win32":
             self._type = ctypes.WINFUNCTYPE
         else:
@@ -78,6 +86,10 @@ class GL:
         function: Callable[..., Any] = self._type(result, *arguments)(address)
         setattr(self, name, function)
         return function
+
+    def debug_callback(self, function: Callable[..., None]) -> Any:
+        """`function` as DebugMessageCallback takes it; keep what is returned as long as OpenGL may call it."""
+        return self._type(None, _U, _U, _U, _U, _I, ctypes.c_char_p, _P)(function)
 
     def make(self, function: str) -> int:
         """One new name from GenTextures, GenFramebuffers or GenQueries."""
@@ -99,5 +111,7 @@ class GL:
         """Raise DeviceError if OpenGL has an error pending: allocations fail silently otherwise."""
         error = self.GetError()
         if error:
+            if self.debug:
+                self.debug.faults.clear()  # raised here
             kind = "out of memory" if error == OUT_OF_MEMORY else f"OpenGL error 0x{error:04x}"
             raise DeviceError(f"{doing}: {kind}; use a smaller size or fewer VPLs")

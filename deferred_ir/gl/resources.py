@@ -121,6 +121,14 @@ class GpuTexture:
         gl.check(f"reading {self.description}")
         return pixels
 
+    def fill(self, byte: int) -> None:
+        """Fill it with a byte, in whatever its texels are stored as."""
+        self.touch()
+        # As floats they would be rounded to what fits; whole numbers of the stored width go in as they are.
+        texel = (ctypes.c_ubyte * 16)(*[byte] * 16)
+        where = (0, 0, 0, 0, *self.size, max(self.description.layers, 1))
+        self.gpu.gl.ClearTexSubImage(self.glo, *where, self.format.layout, self.format.type, texel)
+
     def clear_part(self, layer: int, corner: tuple[int, int], edge: int) -> None:
         """Fill a square of one layer with zeros; corner: (x, y) of its lower left texel."""
         zero = (ctypes.c_float * 4)()

@@ -3,7 +3,7 @@
 A window of n x n pixels has each share once wherever it lies; the mean over the neighbours on the pixel's own surface
 is what all VPLs give there (Laine et al. 2007, section 5.2). Where too few count, on thin things, the pixel itself asks
 the VPLs of the shares that are missing: such pixels are packed into rows of a second draw, so that no processor idles
-beside them.
+beside them. Which neighbours count follows from the G-buffer alone: where frames are reused it is kept with it.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Gather(Pass):
         return {
             "irradiance": Output("irradiance from the VPLs", Texture("rgba32f")),
             "thin": Output("pixels that ask VPLs themselves, row by row", Texture("r32ui"), attach=False),
-            "missing": Output("of which shares, 64 bits each", Texture("rg32ui"), attach=False),
+            "missing": Output("of which shares, 64 bits a pixel", Texture("rg32ui"), attach=False),
             "count": Output("how many", Texture("r32ui", (1, 1)), attach=False),
         }
 
@@ -78,15 +78,20 @@ class Gather(Pass):
             io[name].bind_image(unit)
         io["count"].upload([[0]])
         angle, shares = radians(self.params.angle), int(io.defines["INTERLEAVE"]) ** 2
-        program = io.program("gather.frag")
+        # An even window is off centre: in frames with fresh seeds to all sides, so that their mean is not.
+        side = frame.seed & 1, frame.seed >> 1 & 1
+        windows = (io["depth"].version, io["normals"].version, shares, angle, side) if frame.reuse else None
+        known = windows is not None and io["missing"].kept == windows
+        program = io.program("gather.frag", defines={"KEEP": int(frame.reuse), "KNOWN": int(known)})
         program.set(
             cosine_squared=cos(angle) ** 2,
             sine_squared=sin(angle / 2) ** 2,
             fewest=self.params.fewest * shares,
-            # An even window is off centre: in frames with fresh seeds to all sides, so that their mean is not.
-            side=(frame.seed & 1, frame.seed >> 1 & 1),
+            side=side,
         )
+        io["missing"].kept = None
         program.draw_fullscreen()
+        io["missing"].kept = windows
         if io["rays"]:
             gpu.barrier()
             return

@@ -32,7 +32,7 @@ class ThinRays(Pass):
         "rays": Input("which VPLs are seen: connected where they have no maps", format="r32ui"),
         "thin": Input("numbers of the pixels", format="r32ui"),
         "count": Input("how many", format="r32ui"),
-        "missing": Input("bits of the shares that each asks for", format="rg32ui"),
+        "missing": Input("bits of the shares that each pixel asks for", format="rg32ui"),
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
     }
@@ -52,7 +52,8 @@ class ThinRays(Pass):
         vpls, parts = io["vpls"].records, io["vpls"].description.parts
         count = int(io["count"].read()[0, 0, 0])
         bits = np.zeros((height * width, 2), np.uint32)
-        bits[io["thin"].read().reshape(-1)[:count]] = io["missing"].read().reshape(-1, 2)[:count]
+        listed = io["thin"].read().reshape(-1)[:count]
+        bits[listed] = io["missing"].read().reshape(-1, 2)[listed]
         seen = frame.surfaces(io["depth"], io["normals"])
         asking = seen.rows(np.flatnonzero(bits[seen.pixel].any(axis=1)))
         image = np.zeros((height * width, 4), np.float32)

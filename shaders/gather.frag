@@ -1,4 +1,5 @@
-// The mean irradiance of a window of INTERLEAVE^2 pixels, of those on the pixel's own surface.
+// The mean irradiance of a window of INTERLEAVE^2 pixels, of those on the pixel's own surface. Which those are is found,
+// with KEEP noted in `missing` for frames that follow, or with KNOWN read from there.
 #include "lib/frame.glsl"
 #include "lib/gbuffer.glsl"
 #include "lib/interleave.glsl"
@@ -48,32 +49,60 @@ int share_of(ivec2 pixel) {
     return place.y * N + place.x;
 }
 
-void main() {
+bool has(uvec2 found, int share) {
+    return ((SHARES > 32 ? found[share >> 5] : found.x) >> (share & 31) & 1u) == 1u;
+}
+
+Centre centre(ivec2 pixel, ivec2 size) {
     Centre c;
-    c.pixel = ivec2(gl_FragCoord.xy);
-    c.size = textureSize(depth, 0);
-    c.depth = texelFetch(depth, c.pixel, 0).r;
-    irradiance = vec4(0.0, 0.0, 0.0, 1.0);
-    if (c.depth <= 0.0) return;  // background
-    vec4 code = texelFetch(normals, c.pixel, 0);
+    c.pixel = pixel;
+    c.size = size;
+    c.depth = texelFetch(depth, pixel, 0).r;
+    vec4 code = texelFetch(normals, pixel, 0);
     c.shading_normal = from_octahedral(code.xy);
     c.normal = from_octahedral(code.zw);
-    c.across = frame.ray[0].xyz * (2.0 / float(c.size.x));
-    c.up = frame.ray[1].xyz * (2.0 / float(c.size.y));
+    c.across = frame.ray[0].xyz * (2.0 / float(size.x));
+    c.up = frame.ray[1].xyz * (2.0 / float(size.y));
     c.ray = frame.ray[0].xyz * ndc.x + frame.ray[1].xyz * ndc.y + frame.ray[2].xyz;
+    return c;
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy), size = textureSize(depth, 0);
+    irradiance = vec4(0.0, 0.0, 0.0, 1.0);
     // At the image's border the window moves inwards, so that it has every share.
-    ivec2 corner = clamp(c.pixel - N / 2 + side, ivec2(0), max(c.size - N, 0));
+    ivec2 corner = clamp(pixel - N / 2 + side, ivec2(0), max(size - N, 0));
     vec4 sum = vec4(0.0);
     uvec2 found = uvec2(0u);  // a bit for each share
+#if KNOWN
+    found = ~imageLoad(missing, pixel).rg;
+    if (found == uvec2(0u)) return;  // background; on a surface the pixel finds its own share
+#else
+    Centre c = centre(pixel, size);
+    if (c.depth <= 0.0) {  // background
+#if KEEP
+        imageStore(missing, pixel, uvec4(~0u));
+#endif
+        return;
+    }
+#endif
     for (int y = 0; y < N; ++y)
         for (int x = 0; x < N; ++x) {
             ivec2 other = corner + ivec2(x, y);
-            vec4 one = neighbour(c, other);
             int share = share_of(other);
+#if KNOWN
+            vec3 color = texelFetch(shares, split_place(other, size), 0).rgb;
+            sum += has(found, share) ? vec4(color, 1.0) : vec4(0.0);
+#else
+            vec4 one = neighbour(c, other);
             sum += one;
             found[share >> 5] |= uint(one.a) << (share & 31);
+#endif
         }
     bool lonely = sum.a <= fewest && sum.a < float(SHARES);
+#if !KNOWN
+    if (KEEP == 1 || lonely) imageStore(missing, pixel, uvec4(~found, 0u, 0u));
+#endif
 #if HAS_NEAR_FIELD
     // It is no share's: neighbours have parts of it whichever they are.
     vec4 given = vec4(0.0);
@@ -81,7 +110,7 @@ void main() {
     for (int y = 0; y < alone; ++y)
         for (int x = 0; x < N; ++x) {
             ivec2 other = corner + ivec2(x, y);
-            given += texelFetch(near_field, other, 0) * neighbour(c, other).a;
+            if (has(found, share_of(other))) given += texelFetch(near_field, other, 0);
         }
     vec3 near = given.rgb / max(given.a, 1e-3);
 #else
@@ -90,17 +119,19 @@ void main() {
 #endif
     if (lonely) {
         irradiance.rgb = (sum.rgb - given.rgb) / float(SHARES) + near;
-        ivec2 place = thin_place(imageAtomicAdd(count, ivec2(0), 1u), c.size.x);
-        imageStore(thin, place, uvec4(c.pixel.y * c.size.x + c.pixel.x));
-        imageStore(missing, place, uvec4(~found, 0u, 0u));
+        imageStore(thin, thin_place(imageAtomicAdd(count, ivec2(0), 1u), size.x), uvec4(pixel.y * size.x + pixel.x));
         return;
     }
     // A share that is missing on one side of the pixel may be there on the other. (Where a loop has nothing to do for a
     // group of pixels it is skipped; a branch may not be.)
     int taps = sum.a < float(SHARES) ? SHARES : 0;
+#if KNOWN
+    Centre c;
+    for (int once = 0; once < min(taps, 1); ++once) c = centre(pixel, size);
+#endif
     for (int tap = 0; tap < taps; ++tap) {
-        ivec2 other = corner + ivec2(tap % N, tap / N), turn = N - 2 * N * ivec2(greaterThanEqual(other, c.pixel));
-        int share = share_of(other), tries = (found[share >> 5] >> (share & 31) & 1u) == 1u ? 0 : 3;
+        ivec2 other = corner + ivec2(tap % N, tap / N), turn = N - 2 * N * ivec2(greaterThanEqual(other, pixel));
+        int tries = has(found, share_of(other)) ? 0 : 3;
         vec4 one = vec4(0.0);
         for (int i = 0; i < tries && one.a == 0.0; ++i)  // to the other side in x, in y, in both
             one = neighbour(c, other + turn * ivec2(i != 1, i != 0));

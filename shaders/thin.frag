@@ -18,7 +18,7 @@ void main() {
     vec4 code = texelFetch(normals, pixel, 0);
     vec3 shading_normal = from_octahedral(code.xy), normal = from_octahedral(code.zw);
     vec3 sum = vec3(0.0);
-    uvec2 bits = imageLoad(missing, place).rg;
+    uvec2 bits = imageLoad(missing, pixel).rg;
     const int shares = INTERLEAVE * INTERLEAVE;
     for (int share = 0; share < shares; ++share) {
         bool wanted = ((bits[share >> 5] >> (share & 31)) & 1u) == 1u;

@@ -217,3 +217,14 @@ def test_the_record_tells_what_was_kept_and_what_that_saved(tmp_path):
     made = json.loads(run.read_text())
     assert made["maps_drawn"] == [first] * 5
     assert "lighting" not in {entry["what"] for entry in made["left_out"]}
+
+
+@pytest.mark.parametrize("n", [2, 4, 8])
+def test_windows_that_are_kept_with_the_g_buffer_give_the_same_pixels(renderer, n):
+    """The filter of interleaved sampling asks for neighbours on the same surface only where the camera has moved."""
+    settings = {**SETTINGS, "interleave.n": n}
+    one, other = (renderer((37, 29), "interleaved", set=settings, reuse=reuse) for reuse in (True, False))
+    for step, scene in enumerate([ROOM, LIGHT, ROOM, CAMERA, replace(LIGHT, camera=CAMERA.camera)]):
+        windows = one.executor.resource(("gather", "missing")).kept if step else None
+        np.testing.assert_array_equal(*(made.render(scene, seed=3).radiance for made in (one, other)))
+        assert (one.executor.resource(("gather", "missing")).kept == windows) == (step in (1, 2, 4))

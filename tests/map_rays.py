@@ -39,15 +39,17 @@ def directions(record: Any, size: int, projection: str, texels: tuple[float, flo
     return (2 * tangent * (x[..., None] * right + y[..., None] * up) + (1 - square) * z) / (1 + square)
 
 
-def depths(tracer: Tracer, record: Any, way: np.ndarray, projection: str) -> np.ndarray:
-    """Depth of what rays along `way` (..., 3) from the light meet, 0 where they miss.
+def start(tracer: Tracer, record: Any) -> np.ndarray:
+    """A bit in front of a light, (3,), so that rays do not meet the surface on which it may lie."""
+    return record["position"] + 1e-6 * tracer.scene.geometry.diagonal * record["z_axis"].astype(float)
 
-    They start a bit in front of the light, so that they do not meet the surface on which it may lie.
-    """
+
+def depths(tracer: Tracer, record: Any, way: np.ndarray, projection: str) -> np.ndarray:
+    """Depth of what rays along `way` (..., 3) from the light meet, 0 where they miss."""
     near = NEAR * tracer.scene.geometry.diagonal
     z, position = record["z_axis"].astype(float), record["position"].astype(float)
     rays = way.reshape(-1, 3)
-    hits = tracer.closest(np.broadcast_to(tracer.lift(position, z), rays.shape), rays)
+    hits = tracer.closest(np.broadcast_to(start(tracer, record), rays.shape), rays)
     from_light = hits.position - position
     away = from_light @ z if projection == "perspective" else np.linalg.norm(from_light, axis=1)
     depth = np.zeros(len(rays))
@@ -55,14 +57,25 @@ def depths(tracer: Tracer, record: Any, way: np.ndarray, projection: str) -> np.
     return depth.reshape(way.shape[:-1])
 
 
+def through_light(tracer: Tracer, record: Any, way: np.ndarray) -> np.ndarray:
+    """Whether rays along `way` (..., 3) meet faces in whose plane the light lies, bool (...)."""
+    geometry, position = tracer.scene.geometry, record["position"].astype(float)
+    rays = way.reshape(-1, 3)
+    face = tracer.closest(np.broadcast_to(start(tracer, record), rays.shape), rays).face
+    away = ((position - geometry.positions[geometry.faces[:, 0]]) * geometry.face_normals).sum(axis=1)
+    within = np.abs(away) < 1e-6 * geometry.diagonal
+    return ((face >= 0) & within[face]).reshape(way.shape[:-1])
+
+
 def wrong_texels(tracer: Tracer, record: Any, tile: np.ndarray, projection: str) -> np.ndarray:
     """Which texels of a map (n, n) are off by 2 % from all that nine rays meet, up to a texel from their centre.
 
     So silhouettes do not count. Nor does what is as close as the near plane, where a map is cut, or to the light's own
-    plane.
+    plane; nor a surface that goes through the light itself, of which only the rays, which start in front, see much.
     """
     ways = np.array([directions(record, len(tile), projection, off) for off in AROUND])
     true = depths(tracer, record, ways, projection)
     cosine = ways[CENTRE] @ record["z_axis"].astype(float)
     told = (cosine > 0.02) & (true.max(axis=0) < (0.5 if projection == "perspective" else 0.5 * cosine))
+    told &= ~through_light(tracer, record, ways).any(axis=0)
     return told & ((tile > 1.02 * true.max(axis=0)) | (tile < 0.98 * true.min(axis=0)))

@@ -13,6 +13,7 @@ from small_scenes import Mesh, box, build, crooked_room, plane, quad, room, sphe
 from deferred_ir.camera import Camera
 from deferred_ir.errors import GraphError
 from deferred_ir.interleaving import deal, sub_buffers
+from deferred_ir.lights import NEAR
 from deferred_ir.loading import load
 from deferred_ir.surfaces import from_gbuffer
 from deferred_ir.tracing import Tracer
@@ -89,7 +90,7 @@ def gathered(scene, n, fewest, shares, gbuffer):
     depth, normals = gbuffer
     height, width = depth.shape
     position, normal, shading = np.zeros((3, height, width, 3))
-    seen = from_gbuffer(scene.camera, 1e-4 * scene.geometry.diagonal, depth, normals)
+    seen = from_gbuffer(scene.camera, NEAR * scene.geometry.diagonal, depth, normals)
     for image, values in ((position, seen.position), (normal, seen.normal), (shading, seen.shading_normal)):
         image.reshape(-1, 3)[seen.pixel] = values
     rectangles = sub_buffers((width, height), n)

@@ -10,7 +10,7 @@ from small_scenes import build, plane, quad, room, scaled, sphere, textured
 
 from deferred_ir import vpl_reference
 from deferred_ir.camera import Camera
-from deferred_ir.lights import Spotlight
+from deferred_ir.lights import NEAR, Spotlight
 from deferred_ir.near_field import VplLimits, residual
 from deferred_ir.path_tracer import PathTracer
 from deferred_ir.surfaces import Surfaces, from_gbuffer
@@ -278,7 +278,7 @@ def test_the_g_buffer_gives_the_surfaces_that_rays_find(renderer, tmp_path, scen
     one.draw(scene, one.plan(scene, 1))
     with one.gpu.ctx:
         depth, normals = (one.executor.resource(("gbuffer", port)).read() for port in ("depth", "normals"))
-    near = 1e-4 * scene.geometry.diagonal
+    near = NEAR * scene.geometry.diagonal
     found = from_gbuffer(scene.camera, near, depth[..., 0], normals)
     expected, _ = seen_by(scene, one.tracer())
     flipped = (SIZE[1] - 1 - found.pixel // SIZE[0]) * SIZE[0] + found.pixel % SIZE[0]

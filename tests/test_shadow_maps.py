@@ -48,7 +48,7 @@ def tile(atlas, number, size):
 
 def same_depths(a, b):
     """Equal to rounding, but for texels whose centre lies on a silhouette."""
-    off = np.abs(a - b) > 1e-4 * np.maximum(a, b) + 1e-9
+    off = np.abs(a - b) > 1e-4 * np.maximum(a, b) + 1e-5 * NEAR
     return off.mean() < 0.01
 
 

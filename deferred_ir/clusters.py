@@ -23,6 +23,7 @@ class Clusters:
 
     order: int (F,), the faces of cluster 0, then of cluster 1, ... starts: int (C + 1,), where in `order` each begins.
     reach: largest coordinate, without its sign.
+    A group is a range of clusters: those of lower numbers come first.
     """
 
     def __init__(self, positions: Array, faces: Ints, most: int = CLUSTER, groups: Ints | None = None) -> None:
@@ -35,12 +36,24 @@ class Clusters:
             classes += groups * (OCTAVES + 1)
         self.order, self.starts = split(low / 2 + high / 2, classes, most)
         first = self.starts[:-1]
-        low, high = np.minimum.reduceat(low[self.order], first), np.maximum.reduceat(high[self.order], first)
-        centre = low / 2 + high / 2
-        half = np.maximum(high - centre, centre - low)
-        self.reach = float(np.abs([low, high]).max())
         self._longest = np.maximum.reduceat(edges[self.order], first)
-        self._boxes = np.concatenate([centre, half, np.ones((len(first), 1), np.float32)], axis=1).T.copy()
+        self._boxes = np.ones((7, len(first)), np.float32)
+        self._fit(slice(0, len(first)), low[self.order], high[self.order])
+
+    def _fit(self, chosen: slice, low: Array, high: Array) -> None:
+        """Put boxes about the clusters `chosen`; low, high (n, 3): of their faces, in order."""
+        at = self.starts[chosen] - self.starts[chosen.start]
+        low, high = np.minimum.reduceat(low, at), np.maximum.reduceat(high, at)
+        centre = low / 2 + high / 2
+        self._boxes[:3, chosen], self._boxes[3:6, chosen] = centre.T, np.maximum(high - centre, centre - low).T
+        self.reach = float((np.abs(self._boxes[:3]) + self._boxes[3:6]).max())
+
+    def move(self, chosen: slice, corners: Array) -> None:
+        """Let the clusters `chosen` follow their triangles, whose corners are (n, 3, 3) in their order, float32.
+
+        Triangles have to be what they were, but for a rigid motion.
+        """
+        self._fit(chosen, corners.min(axis=1), corners.max(axis=1))
 
     def __len__(self) -> int:
         return len(self.starts) - 1

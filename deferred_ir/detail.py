@@ -7,14 +7,15 @@ different levels fit together without a gap, and each light may choose by its di
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from .clusters import Clusters, split
+from .geometry import Geometry
+from .map_mesh import MapMesh
 from .proxy import simplify, welded
-from .scene import Geometry
 from .typing import Array, Bools, Ints
 
 CHUNK = 2048
@@ -30,7 +31,8 @@ _known: WeakKeyDictionary[Geometry, Levels] = WeakKeyDictionary()
 class Levels:
     """faces (F, 3) of all levels, on the scene's vertices; level and chunk (F,) of each.
 
-    deviations: (L,), of the levels, from 0, in world units. boxes: (2, C, 3), corners of the chunks.
+    deviations: (L,), of the levels, from 0, in world units. boxes: (2, C, 3), corners of the chunks; those of moving
+    models are not placed. No chunk has triangles of two models that move apart.
     """
 
     faces: Ints
@@ -47,12 +49,20 @@ def levels(geometry: Geometry) -> Levels:
     return _known[geometry]
 
 
+def mesh(geometry: Geometry) -> MapMesh:
+    """The triangles of all levels."""
+    return replace(MapMesh.of(geometry), faces=levels(geometry).faces)
+
+
 def _made(geometry: Geometry) -> Levels:
-    positions = geometry.positions.astype(np.float32)
-    faces = welded(positions, geometry.faces)
+    positions = MapMesh.of(geometry).local.astype(np.float32)
+    faces = np.empty_like(geometry.faces)
+    for group in range(1 + len(geometry.moving)):  # what moves apart is not one, where it touches at rest
+        own = np.flatnonzero(geometry.groups == group)
+        faces[own] = welded(positions, geometry.faces[own])
     corners = positions[faces]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    order, starts = split(low / 2 + high / 2, np.zeros(len(faces), np.intp), CHUNK)
+    order, starts = split(low / 2 + high / 2, geometry.groups, CHUNK)
     chunk = np.empty(len(faces), np.intp)
     chunk[order] = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
     first, last = np.full(len(positions), len(starts)), np.full(len(positions), -1)
@@ -77,12 +87,24 @@ class DetailClusters(Clusters):
     tolerance: gives for LIGHT records (n,) how far a level may be off at most, in distances of surface and light, (n,).
     """
 
-    def __init__(self, positions: Array, detail: Levels, tolerance: Callable[[np.ndarray], Array]) -> None:
-        groups = detail.level * detail.boxes.shape[1] + detail.chunk
-        super().__init__(positions, detail.faces, groups=groups)
+    def __init__(self, mesh: MapMesh, detail: Levels, tolerance: Callable[[np.ndarray], Array]) -> None:
+        levels, chunks = len(detail.deviations), detail.boxes.shape[1]
+        groups = (mesh.groups * levels + detail.level) * chunks + detail.chunk
+        super().__init__(mesh.local, detail.faces, groups=groups)
         first = self.order[self.starts[:-1]]
         self._level, self._chunk = detail.level[first], detail.chunk[first]
-        self._detail, self._tolerance = detail, tolerance
+        self._detail, self._tolerance, self._chunks = detail, tolerance, detail.boxes.copy()
+
+    def move(self, chosen: slice, corners: Array) -> None:
+        """As in Clusters; the boxes of chunks, by which levels are chosen, follow."""
+        super().move(chosen, corners)
+        faces = self.order[self.starts[chosen.start] : self.starts[chosen.stop]]
+        finest = self._detail.level[faces] == 0
+        chunk, corners = self._detail.chunk[faces[finest]], corners[finest]
+        low, high = self._chunks
+        low[chunk], high[chunk] = np.inf, -np.inf
+        np.minimum.at(low, chunk, corners.min(axis=1))
+        np.maximum.at(high, chunk, corners.max(axis=1))
 
     def visible(self, lights: np.ndarray, *, hemisphere: bool = False) -> Bools:
         """As in Clusters, of the levels that the lights draw."""
@@ -91,7 +113,7 @@ class DetailClusters(Clusters):
     def drawn(self, lights: np.ndarray) -> Bools:
         """Which clusters make up the scene for each of `lights`, LIGHT records (n,): bool (n, C)."""
         position = lights["position"][:, None].astype(np.float64)
-        low, high = self._detail.boxes
+        low, high = self._chunks
         away = np.maximum(np.maximum(low - position, position - high), 0)
         allowed = self._tolerance(lights)[:, None] * np.sqrt((away**2).sum(axis=-1))
         chosen = np.searchsorted(self._detail.deviations[1:], allowed, side="right")

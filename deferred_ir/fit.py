@@ -37,7 +37,7 @@ def fitted(scene: Scene, camera: bool, spotlight: bool) -> Scene:
     """`scene` with its camera and its spotlight replaced by chosen ones, as the two flags say; fills Scene.chosen."""
     if not (camera or spotlight):
         return scene
-    near, reasons = _chosen(scene.centred, camera, spotlight)
+    near, reasons = _chosen(scene.at(0).centred, camera, spotlight)
     by = scene.geometry.centre
     views: dict[str, Any] = {"camera": near.camera, "spotlight": near.spotlight}
     views = {name: moved(views[name], by) if any(by) else views[name] for name in reasons}

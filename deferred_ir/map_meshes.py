@@ -9,30 +9,25 @@ from .clusters import Clusters
 from .frame import Frame
 from .gl.cluster_buffers import ClusterBuffers
 from .io import Io
+from .map_mesh import MapMesh
 from .maps import MapParams
-from .subdivision import subdivide
-from .typing import Array, Bools, Ints
+from .subdivision import subdivided
+from .typing import Bools
 
 
 def of_vpls(frame: Frame, params: MapParams) -> ClusterBuffers:
     """What the maps of VPLs draw."""
-    buffers, geometry = frame.buffers, frame.scene.geometry
+    buffers, geometry = frame.buffers, frame.scene.geometry.rest
     if params.projection == "paraboloid" and params.tessellation == "pre":
-
-        def split() -> tuple[Array, Ints]:
-            return subdivide(geometry.positions, geometry.faces, params.edge * geometry.diagonal)
-
-        return buffers.stand_in(("edge", params.edge), split)
+        longest = params.edge * geometry.diagonal
+        return buffers.stand_in(("edge", params.edge), lambda: subdivided(MapMesh.of(geometry), longest))
     if params.vpl_deviation > 0:
 
-        def simplified() -> tuple[Array, Ints]:
-            return geometry.positions, detail.levels(geometry).faces
-
-        def cluster(positions: Array, _: Ints) -> Clusters:
-            return detail.DetailClusters(positions, detail.levels(geometry), params.tolerance)
+        def cluster(mesh: MapMesh) -> Clusters:
+            return detail.DetailClusters(mesh, detail.levels(geometry), params.tolerance)
 
         key = ("detail", params.vpl_deviation, params.vpl_size, params.projection)
-        return buffers.stand_in(key, simplified, cluster)
+        return buffers.stand_in(key, lambda: detail.mesh(geometry), cluster)
     return buffers.cluster_buffers
 
 

@@ -39,6 +39,11 @@ def merge(
         face_textures.append(np.full(len(part.faces), texture))
     order = np.argsort(np.concatenate(face_textures), kind="stable")
     faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])
+    ranges, first = [], 0
+    for model, motion in models:
+        count = sum(len(part.positions) for part in model.parts)
+        ranges.append(Model(model.name, first, count, motion))
+        first += count
     geometry = Geometry(
         positions=np.concatenate([part.positions for part in parts]),
         faces=faces[order].astype(np.int32),
@@ -46,14 +51,11 @@ def merge(
         normals=_joined(parts, lambda part: part.normals, np.zeros(3)),
         uvs=_joined(parts, lambda part: part.uvs, np.zeros(2)),
         colors=_joined(parts, lambda part: part.colors, np.ones(3)),
+        moving=tuple(model for model in ranges if model.motion),
     )
-    if geometry.diagonal <= 1e-12 * float(np.abs(geometry.bounds).max()):
+    low, high = geometry.bounds
+    if np.linalg.norm(high - low) <= 1e-12 * float(np.abs(geometry.bounds).max()):
         raise SceneError(f"{file}: all vertices lie in one point (to 64-bit floats); scale or move the model")
-    ranges, first = [], 0
-    for model, motion in models:
-        count = sum(len(part.positions) for part in model.parts)
-        ranges.append(Model(model.name, first, count, motion))
-        first += count
     return geometry, tuple(materials), tuple(texture for _, texture in textures.values()), tuple(ranges)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -86,11 +86,29 @@ SpotlightMotion = LissajousMotion | KeyframedSpotlight
 
 @dataclass(frozen=True)
 class ModelMotion:
-    """Keyframes of a rigid motion: translations and unit quaternions (x, y, z, w) at times (seconds, ascending)."""
+    """Keyframes of a rigid motion: translations and unit quaternions (x, y, z, w) at times (seconds, ascending).
+
+    It turns about the world's origin. origin: where in the world the coordinates begin that it is asked in.
+    """
 
     times: tuple[float, ...]
     translations: tuple[Vec3, ...]
     rotations: tuple[tuple[float, float, float, float], ...]
+    origin: Vec3 = field(default=(0.0, 0.0, 0.0), repr=False)
+
+    def seen_from(self, origin: Vec3) -> ModelMotion:
+        """The same in coordinates that begin at `origin`."""
+        (x, y, z), (u, v, w) = self.origin, origin
+        return replace(self, origin=(x + u, y + v, z + w))
+
+    def held(self, time: float) -> ModelMotion:
+        """A motion that rests where this one is at `time`."""
+        from scipy.spatial.transform import Rotation
+
+        matrix = replace(self, origin=(0.0, 0.0, 0.0)).matrix(time)
+        x, y, z = matrix[:3, 3].tolist()
+        i, j, k, w = Rotation.from_matrix(matrix[:3, :3]).as_quat().tolist()
+        return replace(self, times=(0.0,), translations=((x, y, z),), rotations=((i, j, k, w),))
 
     def matrix(self, time: float) -> Array:
         """The 4x4 rigid transform at `time`: linear translation, spherical linear rotation; it rests at both ends."""
@@ -102,4 +120,5 @@ class ModelMotion:
             result[axis, 3] = np.interp(time, self.times, np.asarray(self.translations)[:, axis])
         rotations = Rotation.from_quat(np.asarray(self.rotations))
         result[:3, :3] = (Slerp(self.times, rotations)(time) if len(self.times) > 1 else rotations[0]).as_matrix()
+        result[:3, 3] += result[:3, :3] @ self.origin - self.origin
         return result

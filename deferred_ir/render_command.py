@@ -174,8 +174,6 @@ def _notes(scene: Scene, outputs: list[str], frames: int) -> Iterator[str]:
             if not _NUMBER.search(name):
                 path = Path(name)
                 yield f"{name} keeps the last of {frames} frames; {path.stem}_%04d{path.suffix} keeps all"
-    if frames > 1 and any(model.motion for model in scene.models):
-        yield "model.motion: moving models are not drawn yet; they stand still"
 
 
 @contextmanager

@@ -163,13 +163,14 @@ class Renderer:
         if self._closed:
             raise SettingError("Renderer: is closed; make a new one")
         with self.gpu.ctx:
-            self._upload(scene)
+            placed = scene.at(time).centred
+            self._upload(placed)
             assert self._buffers
             start = clock.perf_counter()
-            now = scene.at(time).centred
+            self._buffers.move(placed.geometry)
             frame = Frame(
                 self.size,
-                now,
+                placed,
                 self._buffers,
                 self.tracer,
                 seed,
@@ -224,19 +225,22 @@ class Renderer:
         return self._tracer.seconds if self._tracer else 0.0
 
     def _upload(self, scene: Scene) -> None:
-        """Put the scene on the device unless it is there; the same surfaces may come with a new camera or light."""
-        surfaces = ("geometry", "materials", "textures")
-        if self._scene and all(getattr(scene, part) is getattr(self._scene, part) for part in surfaces):
-            return
-        self._forget()
-        self.reset()
-        self._buffers, self._scene = SceneBuffers(self.gpu, scene.centred), scene
+        """Put the scene on the device unless it is there; the same surfaces may come with a new camera or light.
+
+        Moving models may be elsewhere, too: then the surfaces are those of one `rest`.
+        """
+        if not (self._scene and _same_surfaces(scene, self._scene)):
+            self._forget()
+            self.reset()
+            self._buffers = SceneBuffers(self.gpu, scene)
+        self._scene = scene
 
     def tracer(self) -> Tracer:
         """Embree over the scene drawn last, in the coordinates of `Scene.centred`, built when first asked for."""
+        assert self._scene, "no scene was drawn yet"
         if self._tracer is None:
-            assert self._scene, "no scene was drawn yet"
-            self._tracer = Tracer(self._scene.centred)
+            self._tracer = Tracer(self._scene)
+        self._tracer.follow(self._scene)
         return self._tracer
 
     def _forget(self) -> None:
@@ -264,6 +268,11 @@ class Renderer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _same_surfaces(one: Scene, other: Scene) -> bool:
+    same_rest = one.geometry.rest is other.geometry.rest
+    return same_rest and one.materials is other.materials and one.textures is other.textures
 
 
 def _check_images(graph: Graph, plan: Plan) -> None:

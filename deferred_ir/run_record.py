@@ -83,7 +83,8 @@ def _bias(renderer: Renderer, scene: Scene, graph: Graph, plan: Plan) -> dict[st
         return None
     p = casting.work.params
     given_back = any(step.work.gives_back for step in plan.steps)
-    return bias.estimate(scene.centred, renderer.tracer(), clamp=p.clamp_fraction, fov=p.fov, given_back=given_back)
+    tracer = renderer.tracer()  # its scene is that of the last frame
+    return bias.estimate(tracer.scene, tracer, clamp=p.clamp_fraction, fov=p.fov, given_back=given_back)
 
 
 def write(path: Path, data: dict[str, Any]) -> None:

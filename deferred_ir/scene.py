@@ -15,13 +15,10 @@ import numpy as np
 
 from .camera import Camera, view_fault
 from .errors import SceneError
+from .geometry import Geometry, Model
 from .graph import Facts
 from .lights import Spotlight
-from .motion import ModelMotion
-from .typing import Array, Ints, Vec3
-
-FAR = 4.0
-"""Scenes farther than this many of their diagonals from the origin are moved to it before 32 bits hold them."""
+from .typing import Vec3
 
 View = TypeVar("View", Camera, Spotlight)
 
@@ -47,79 +44,6 @@ class Material:
     name: str
     albedo: tuple[float, float, float]
     texture: int | None = None
-
-
-@dataclass(frozen=True)
-class Model:
-    """One [[model]] of the scene file and its range of vertices.
-
-    Its faces are those that use these vertices; they need not be neighbours, since faces are sorted by texture.
-    """
-
-    name: str
-    first_vertex: int
-    vertex_count: int
-    motion: ModelMotion | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Geometry:
-    """All triangles of a scene, indexed.
-
-    positions: float64 (V, 3).
-    faces: int32 (F, 3), counter-clockwise from the front.
-    face_materials: int32 (F,), index into Scene.materials. Faces are sorted by their material's texture: first those
-        without one, then texture 0, 1, ...
-    normals: float32 (V, 3) unit shading normals, a zero row where the file has none (the face's normal counts there);
-        None if no vertex has one.
-    uvs: float32 (V, 2), or None if no material has a texture.
-    colors: float32 (V, 3) linear vertex colours that multiply the albedo, or None.
-    """
-
-    positions: Array
-    faces: Ints
-    face_materials: Ints
-    normals: Array | None = None
-    uvs: Array | None = None
-    colors: Array | None = None
-
-    @cached_property
-    def face_normals(self) -> Array:
-        """Unit geometric normals by winding, float64 (F, 3); +y for a degenerate face, which covers no pixel."""
-        a, b, c = (self.positions[self.faces[:, i]] for i in range(3))
-        # Edges scaled to about 1 first: the product of two tiny edges must not underflow.
-        ab, ac = b - a, c - a
-        size = np.maximum(np.abs(ab).max(axis=1), np.abs(ac).max(axis=1))[:, None]
-        size[size == 0] = 1
-        cross = np.cross(ab / size, ac / size)
-        length = np.linalg.norm(cross, axis=1)
-        flat = length < 1e-30
-        cross[flat], length[flat] = (0, 1, 0), 1
-        normals: Array = cross / length[:, None]
-        return normals
-
-    @cached_property
-    def bounds(self) -> Array:
-        """Corners (minimum, maximum) of all vertices that faces use, float64 (2, 3)."""
-        used = self.positions[np.unique(self.faces)]
-        return np.stack([used.min(axis=0), used.max(axis=0)])
-
-    @cached_property
-    def diagonal(self) -> float:
-        """Length of the bounding box's diagonal."""
-        return float(np.linalg.norm(self.bounds[1] - self.bounds[0]))
-
-    @cached_property
-    def centre(self) -> Vec3:
-        """Where the origin of 32-bit coordinates lies: the middle of the bounds where they are far off, else 0."""
-        middle = self.bounds.mean(axis=0)
-        x, y, z = middle.tolist() if np.abs(middle).max() > FAR * self.diagonal else (0.0, 0.0, 0.0)
-        return x, y, z
-
-    @cached_property
-    def centred(self) -> Geometry:
-        """The same with `centre` as its origin, subtracted in 64 bits; itself where that is 0."""
-        return replace(self, positions=self.positions - self.centre) if any(self.centre) else self
 
 
 @dataclass(frozen=True)
@@ -186,9 +110,19 @@ class Scene:
         """What planning a frame may know of the scene."""
         return Facts(emits=any(self.spotlight.emission), triangles=len(self.geometry.faces))
 
+    @property
+    def moves(self) -> bool:
+        """Whether anything in it has a motion."""
+        return bool(self.camera.motion or self.spotlight.motion or self.geometry.moves)
+
     def at(self, time: float) -> Scene:
-        """The scene with camera and spotlight at `time` seconds; SceneError if one of them meets what it looks at."""
-        if self.camera.motion is None and self.spotlight.motion is None:
+        """The scene at `time` seconds, at rest there; itself where nothing moves.
+
+        At times between which no model moves geometry is the same object. SceneError if camera or spotlight meet what
+        they look at.
+        """
+        geometry = self.geometry.at(time)
+        if geometry is self.geometry and self.camera.motion is None and self.spotlight.motion is None:
             return self
         camera, light = self.camera.at(time), self.spotlight.at(time)
         views = {
@@ -198,4 +132,6 @@ class Scene:
         for name, fault in views.items():
             if fault:
                 raise SceneError(f"{self.path}: {name}.motion: at {time:g} s {fault[0]} {fault[1]}")
-        return replace(self, camera=camera, spotlight=light)
+        return replace(
+            self, geometry=geometry, camera=replace(camera, motion=None), spotlight=replace(light, motion=None)
+        )

@@ -7,9 +7,13 @@ a triangle where one is too long, whatever its neighbour does.)
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from .errors import GraphError
+from .geometry import middle
+from .map_mesh import MapMesh
 from .typing import Array, Bools, Ints
 
 MOST = 2_000_000
@@ -40,6 +44,21 @@ def subdivide(positions: Array, faces: Ints, longest: float, most: int = MOST) -
         points, middles = _halve(points, ahead, long)
         ahead = _parts(points, ahead, middles, long)
     return points, np.concatenate(done)
+
+
+def subdivided(mesh: MapMesh, longest: float) -> MapMesh:
+    """The same for a mesh, of which what moves apart is split apart."""
+    parts = [subdivide(mesh.positions, mesh.faces[mesh.groups == 0], longest)]
+    for number, vertices in enumerate(mesh.moving, start=1):
+        own, faces = mesh.positions[vertices], mesh.faces[mesh.groups == number] - vertices.start
+        points, faces = subdivide(own - middle(own), faces, longest)
+        parts.append((points + middle(own), faces))
+    starts = np.cumsum([0, *(len(points) for points, _ in parts)]).tolist()
+    return MapMesh(
+        np.concatenate([points for points, _ in parts]),
+        np.concatenate([faces + start for (_, faces), start in zip(parts, starts, strict=False)]),
+        tuple(slice(start, stop) for start, stop in pairwise(starts[1:])),
+    )
 
 
 def _lengths(points: Array, faces: Ints) -> Array:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from . import materials
-from .errors import DeviceError
+from .rays import INFINITE, Rays
 from .scene import Scene
 from .typing import Array, Bools, Ints
 
@@ -52,24 +52,23 @@ class Hits:
 
 
 class Tracer:
-    """Embree over one scene's triangles. Build it once a scene; `seconds` is the time spent inside Embree so far."""
+    """Embree over one scene's triangles. Build it once a scene, and let it `follow` the scene's moving models.
+
+    `seconds` is the time spent inside Embree so far.
+    """
 
     def __init__(self, scene: Scene) -> None:
-        try:
-            from embreex import rtcore_scene
-            from embreex.mesh_construction import TriangleMesh
-        except ImportError as error:
-            raise DeviceError(
-                "embreex: not installed, so no rays can be traced; pip install embreex, or render with --vpls 0"
-            ) from error
         self.scene = scene
         self.seconds = 0.0
-        geometry = scene.geometry
-        self._embree = rtcore_scene.EmbreeScene(robust=True)
-        TriangleMesh(self._embree, geometry.positions.astype(np.float32), geometry.faces.astype(np.int32))
-        self.offset = OFFSET * float(max(geometry.diagonal, np.abs(geometry.bounds).max()))
-        # The first ray commits Embree's scene, which must not happen in two threads at once.
-        self._embree.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+        self._rays = Rays(scene.geometry)
+        extent = scene.geometry.extent
+        self.offset = OFFSET * float(max(scene.geometry.diagonal, np.abs(extent).max()))
+
+    def follow(self, scene: Scene) -> None:
+        """Go on with the same triangles where `scene` has them: its moving models may be elsewhere."""
+        if scene.geometry is not self.scene.geometry:
+            self._rays.pose(scene.geometry)
+        self.scene = scene
 
     @cached_property
     def _pool(self) -> ThreadPoolExecutor:
@@ -86,10 +85,8 @@ class Tracer:
     def closest(self, origins: Array, directions: Array) -> Hits:
         """First surfaces that rays (n, 3), (n, 3) meet; the caller offsets origins that lie on a surface."""
         org, dirs = origins.astype(np.float32), directions.astype(np.float32)
-        parts = self._map(lambda chunk: self._embree.run(org[chunk], dirs[chunk], output=1), len(org))
-        face = np.concatenate([np.asarray(part["primID"], np.int32) for part in parts] or [np.zeros(0, np.int32)])
-        u = np.concatenate([part["u"] for part in parts] or [np.zeros(0)]).astype(np.float64)
-        v = np.concatenate([part["v"] for part in parts] or [np.zeros(0)]).astype(np.float64)
+        face, u, v = self._first(lambda chunk: self._rays.closest(org[chunk], dirs[chunk]), len(org))
+        u, v = u.astype(np.float64), v.astype(np.float64)
         return self._hits(face, np.stack([1 - u - v, u, v], axis=-1), np.asarray(directions, np.float64))
 
     def within(self, origins: Array, directions: Array, reach: float) -> tuple[Ints, Hits]:
@@ -98,16 +95,18 @@ class Tracer:
         Rows of the rays (m,), ascending, and their m closest hits. As `closest`, but free of what rays that miss cost.
         """
         org, dirs = origins.astype(np.float32), directions.astype(np.float32)
-        tfar = np.full(len(org), min(reach, 1e37), np.float32)
-        parts = self._map(
-            lambda chunk: self._embree.run(org[chunk], dirs[chunk], dists=tfar[chunk].copy(), output=1), len(org)
-        )
-        none = [np.zeros(0, np.int32)]
-        face, u, v = (np.concatenate([part[name] for part in parts] or none) for name in ("primID", "u", "v"))
+        ends = np.full(len(org), min(reach, INFINITE), np.float32)
+        face, u, v = self._first(lambda chunk: self._rays.closest(org[chunk], dirs[chunk], ends[chunk]), len(org))
         rows = np.flatnonzero(face >= 0)
         u, v = u[rows].astype(np.float64), v[rows].astype(np.float64)
         weights = np.stack([1 - u - v, u, v], axis=-1)
         return rows, self._hits(face[rows], weights, np.asarray(directions[rows], np.float64))
+
+    def _first(self, ask: Callable[[slice], tuple[Ints, Array, Array]], count: int) -> tuple[Ints, Array, Array]:
+        """What `ask` gives for all chunks of rays, joined: faces, u and v."""
+        parts = [(np.zeros(0, np.int32), np.zeros(0, np.float32), np.zeros(0, np.float32)), *self._map(ask, count)]
+        face, u, v = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return face, u, v
 
     def _hits(self, face: Ints, weights: Array, directions: Array) -> Hits:
         geometry = self.scene.geometry
@@ -134,11 +133,8 @@ class Tracer:
         """
         org, way = origins.astype(np.float32), (targets - origins).astype(np.float32)
         reach = np.full(len(org), 1 - 1e-4, np.float32)
-        parts = self._map(
-            lambda chunk: self._embree.run(org[chunk], way[chunk], dists=reach[chunk].copy(), query="OCCLUDED"),
-            len(org),
-        )
-        return np.concatenate([np.asarray(part) == 0 for part in parts] or [np.zeros(0, bool)])
+        parts = self._map(lambda chunk: self._rays.occluded(org[chunk], way[chunk], reach[chunk]), len(org))
+        return np.concatenate([np.zeros(0, bool), *parts])
 
     def lift(self, positions: Array, normals: Array) -> Array:
         """Points pushed off their surfaces along `normals`, so that rays from them do not meet it again."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from deferred_ir.camera import Camera
 from deferred_ir.lights import Spotlight
+from deferred_ir.motion import ModelMotion
 from deferred_ir.scene import Geometry, Material, Model, Scene, Texture
 
 GREY = (0.5, 0.5, 0.5)
@@ -54,16 +55,26 @@ def sphere(radius: float = 1.0, subdivisions: int = 3, albedo: tuple[float, floa
     return Mesh(unit * radius, np.array(mesh.faces), albedo, unit)
 
 
-def build(*meshes: Mesh, camera: Camera | None = None, spotlight: Spotlight | None = None) -> Scene:
-    """A scene of these meshes, a material for each."""
+def build(
+    *meshes: Mesh,
+    camera: Camera | None = None,
+    spotlight: Spotlight | None = None,
+    motions: Sequence[ModelMotion | None] | None = None,
+) -> Scene:
+    """A scene of these meshes, a material for each. One model, or a model of each mesh if they have `motions`."""
     starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes)])
     smooth = any(mesh.normals is not None for mesh in meshes)
     normals = [np.zeros_like(mesh.positions) if mesh.normals is None else mesh.normals for mesh in meshes]
+    models = tuple(
+        Model(f"model {i}", int(starts[i]), len(mesh.positions), motion)
+        for i, (mesh, motion) in enumerate(zip(meshes, motions or (), strict=bool(motions)))
+    )
     geometry = Geometry(
         positions=np.concatenate([mesh.positions for mesh in meshes]).astype(np.float64),
         faces=np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]).astype("i4"),
         face_materials=np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes]).astype("i4"),
         normals=np.concatenate(normals).astype("f4") if smooth else None,
+        moving=tuple(model for model in models if model.motion),
     )
     return Scene(
         name="built",
@@ -71,7 +82,7 @@ def build(*meshes: Mesh, camera: Camera | None = None, spotlight: Spotlight | No
         geometry=geometry,
         materials=tuple(Material(f"material {i}", mesh.albedo) for i, mesh in enumerate(meshes)),
         textures=(),
-        models=(Model("built", 0, int(starts[-1])),),
+        models=models or (Model("built", 0, int(starts[-1])),),
         camera=camera or Camera((0.0, 2.0, 3.0), (0.0, 0.0, 0.0)),
         spotlight=spotlight or Spotlight((0.3, 1.5, 0.2), (0.0, 0.0, 0.0), 70.0, (3.0, 2.0, 1.0)),
     )

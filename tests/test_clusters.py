@@ -11,9 +11,9 @@ from small_scenes import Mesh, build, crooked_room, room
 
 from deferred_ir import map_meshes
 from deferred_ir.clusters import Clusters
-from deferred_ir.gl import scene_buffers
 from deferred_ir.lights import LIGHT, LIGHTS_PER_BLOCK, light_records
 from deferred_ir.loading import load
+from deferred_ir.map_mesh import MapMesh
 
 SETTINGS = {"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}
 WHOLE = 10**9
@@ -146,7 +146,7 @@ class Atlases:
         self.patch = monkeypatch
 
     def __call__(self, scene, most: int) -> np.ndarray:
-        self.patch.setattr(scene_buffers, "Clusters", lambda positions, faces: Clusters(positions, faces, most))
+        self.patch.setattr(MapMesh, "clustered", lambda mesh: Clusters(mesh.positions, mesh.faces, most))
         self.one._forget()
         self.one.render(scene)
         with self.one.gpu.ctx:
@@ -229,7 +229,7 @@ def halved(scene):
     """Only every other triangle, with vertices of its own."""
     geometry = scene.geometry
     corners = geometry.positions[geometry.faces[::2]]
-    return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+    return MapMesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
 
 
 @pytest.mark.parametrize("graph", ["deferred", "forward"])

@@ -38,7 +38,7 @@ def lights(count=40, fov=150.0):
 
 
 def clusters(scene, params):
-    return detail.DetailClusters(scene.geometry.positions, detail.levels(scene.geometry), params.tolerance)
+    return detail.DetailClusters(detail.mesh(scene.geometry), detail.levels(scene.geometry), params.tolerance)
 
 
 @pytest.mark.parametrize("projection", ["perspective", "paraboloid"])

@@ -102,5 +102,7 @@ def test_a_scene_moves_its_camera_and_light_only():
     moved = moving.at(1.0)
     assert moved.geometry is scene.geometry
     assert moved.camera == scene.camera
-    assert moved.spotlight == moving.spotlight.at(1.0) != moving.spotlight
+    assert moved.spotlight == replace(moving.spotlight.at(1.0), motion=None)
+    assert moved.spotlight.position != moving.spotlight.position
+    assert moved.at(2.0) is moved  # a moment stays
     assert moving.hash != scene.hash

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..clusters import Clusters
-from ..typing import Bools, Ints
+from ..map_mesh import PosedMesh
+from ..typing import Array, Bools, Ints
 from .gpu import Gpu
 from .shaders import Program
 
@@ -16,13 +16,15 @@ COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index
 
 
 class ClusterBuffers:
-    """Indices of `faces` (F, 3) in the order of `clusters`, and what a call draws of them.
+    """Indices of a mesh's faces in the order of its clusters, and what a call draws of them.
 
     positions: the buffer of vertices, three floats each; it stays its maker's.
     """
 
-    def __init__(self, gpu: Gpu, clusters: Clusters, faces: Ints, positions: Any) -> None:
-        self.gpu, self.clusters, self._positions = gpu, clusters, positions
+    def __init__(self, gpu: Gpu, posed: PosedMesh, positions: Any) -> None:
+        self.gpu, self.posed, self._positions = gpu, posed, positions
+        self.clusters = clusters = posed.clusters
+        faces = posed.mesh.faces
         self._indices = gpu.ctx.buffer(np.ascontiguousarray(faces[clusters.order], "u4").tobytes())
         self._lights = gpu.ctx.buffer(reserve=4, dynamic=True)
         self._commands = gpu.ctx.buffer(reserve=len(clusters) * COMMAND.itemsize, dynamic=True)
@@ -40,6 +42,11 @@ class ClusterBuffers:
         """Size of vertices and indices alone."""
         size: int = self._positions.size + self._indices.size
         return size
+
+    def move(self, number: int, pose: Array) -> None:
+        """Bring moving model `number` from rest by `pose` (4, 4), its vertices, too."""
+        first, points = self.posed.move(number, pose)
+        self._positions.write(points.tobytes(), offset=12 * first)
 
     def draw_all(self, program: Program, light: np.ndarray) -> None:
         """Draw all that makes up the scene for one light, LIGHT records (1,). The program reads `position` alone."""

@@ -1,4 +1,4 @@
-"""A scene on the GPU: vertices, faces, materials and textures, uploaded once."""
+"""A scene on the GPU: vertices, faces, materials and textures, uploaded once; of moving models what moves, again."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ import numpy as np
 
 from ..clusters import Clusters
 from ..errors import DeviceError
+from ..geometry import Geometry
 from ..graph import Texture
+from ..map_mesh import MapMesh, PosedMesh
 from ..materials import srgb_table
 from ..scene import Scene
 from ..typing import Array, Ints
@@ -31,7 +33,8 @@ class SceneBuffers:
     """Indexed triangles with what shaders read of each face. `defines` say which attributes there are."""
 
     def __init__(self, gpu: Gpu, scene: Scene) -> None:
-        self.gpu, self._scene, g = gpu, scene, scene.geometry
+        self.gpu, g = gpu, scene.geometry
+        self._geometry = g
         self.defines = {
             "HAS_NORMALS": int(g.normals is not None),
             "HAS_UVS": int(bool(scene.textures) and g.uvs is not None),
@@ -47,7 +50,7 @@ class SceneBuffers:
             if array is not None
         }
         self._indices = ctx.buffer(np.ascontiguousarray(g.faces, "u4").tobytes())
-        faces = np.column_stack([g.face_normals, g.face_materials]).astype("f4")
+        faces = _face_records(g, slice(None))
         materials = np.array([(*material.albedo, 0) for material in scene.materials], "f4")
         self._faces, self._materials = ctx.buffer(faces.tobytes()), ctx.buffer(materials.tobytes())
         gpu.gl.check(f"scene '{scene.name}' with {len(g.faces)} triangles")
@@ -70,34 +73,56 @@ class SceneBuffers:
         return [self, *self._clustered.values()]
 
     @cached_property
+    def _own(self) -> PosedMesh:
+        mesh = MapMesh.of(self._geometry)
+        return mesh.posed(mesh.clustered(), self._geometry.poses)
+
+    @property
     def clusters(self) -> Clusters:
         """The scene's triangles in clusters, on the CPU."""
-        return Clusters(self._scene.geometry.positions, self._scene.geometry.faces)
+        return self._own.clusters
 
     @property
     def cluster_buffers(self) -> ClusterBuffers:
         """The scene's triangles in clusters, made when first drawn so."""
         if OWN not in self._clustered:
-            g = self._scene.geometry
-            uploaded = self._attributes["position"][0]
-            self._clustered[OWN] = ClusterBuffers(self.gpu, self.clusters, g.faces, uploaded)
+            self._clustered[OWN] = ClusterBuffers(self.gpu, self._own, self._attributes["position"][0])
         return self._clustered[OWN]
 
     def stand_in(
-        self,
-        key: Hashable,
-        make: Callable[[], tuple[Array, Ints]],
-        cluster: Callable[[Array, Ints], Clusters] = Clusters,
+        self, key: Hashable, make: Callable[[], MapMesh], cluster: Callable[[MapMesh], Clusters] = MapMesh.clustered
     ) -> ClusterBuffers:
         """Another mesh that is drawn in the scene's place, in clusters, kept by `key` until the scene goes.
 
-        make: gives positions (V, 3) and faces (F, 3); cluster: groups them. Both are called for the first draw only.
+        make: gives it, with as many moving models as the scene; cluster: groups it. Both are called for the first draw
+        only.
         """
         if key not in self._clustered:
-            positions, faces = make()
-            self._buffers.append(self.gpu.ctx.buffer(np.ascontiguousarray(positions, "f4").tobytes()))
-            self._clustered[key] = ClusterBuffers(self.gpu, cluster(positions, faces), faces, self._buffers[-1])
+            mesh, poses = make(), self._geometry.poses
+            self._buffers.append(self.gpu.ctx.buffer(np.ascontiguousarray(mesh.positions, "f4").tobytes()))
+            made = ClusterBuffers(self.gpu, mesh.posed(cluster(mesh), poses), self._buffers[-1])
+            for number, pose in enumerate(poses):
+                made.move(number, pose)
+            self._clustered[key] = made
         return self._clustered[key]
+
+    def move(self, geometry: Geometry) -> None:
+        """Bring moving models to where `geometry`, posed from the same rest, has them; the rest is not touched."""
+        before, self._geometry = self._geometry, geometry
+        if geometry is before:
+            return
+        for number in np.flatnonzero((geometry.poses != before.poses).any(axis=(1, 2))).tolist():
+            vertices = geometry.moving[number].vertices
+            for name, array in (("position", geometry.positions), ("normal", geometry.normals)):
+                if array is not None:
+                    part = np.ascontiguousarray(array[vertices], "f4")
+                    self._attributes[name][0].write(part.tobytes(), offset=12 * vertices.start)
+            for faces in _runs(geometry.faces_of[number]):
+                self._faces.write(_face_records(geometry, faces).tobytes(), offset=16 * faces.start)
+            if "_own" in self.__dict__:
+                self._own.move(number, geometry.poses[number])
+            for mesh in (mesh for key, mesh in self._clustered.items() if key != OWN):
+                mesh.move(number, geometry.poses[number])
 
     def _upload(self, texture: Any) -> GpuTexture:
         height, width = texture.pixels.shape[:2]
@@ -145,6 +170,17 @@ class SceneBuffers:
             buffer.release()
         for texture in self._textures:
             texture.release()
+
+
+def _face_records(geometry: Geometry, faces: slice) -> Array:
+    """What lib/surface.glsl reads of faces: normal and material's number, float32 (n, 4)."""
+    return np.column_stack([geometry.face_normals[faces], geometry.face_materials[faces]]).astype("f4")
+
+
+def _runs(numbers: Ints) -> list[slice]:
+    """Ascending numbers (n,) as ranges without a gap."""
+    parts = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
+    return [slice(int(part[0]), int(part[-1]) + 1) for part in parts if len(part)]
 
 
 def _ranges(scene: Scene) -> list[tuple[int | None, int, int]]:

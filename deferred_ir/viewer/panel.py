@@ -129,7 +129,7 @@ class Panel:
             session.moved()
         _, session.progressive = imgui.checkbox("progressive (Space)", session.progressive)
         imgui.set_item_tooltip("Average frames with new samples where nothing moves.")
-        if session.scene.camera.motion or session.scene.spotlight.motion:
+        if session.scene.moves:
             _, session.playing = imgui.checkbox("play motions (P)", session.playing)
 
     def _light(self) -> None:

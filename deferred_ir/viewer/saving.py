@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .. import scene_file
 from ..camera import Camera
 from ..errors import OutputError
@@ -65,7 +67,7 @@ def table(session: Session) -> dict[str, Any]:
         render["set"] = dict(session.settings)
     return {
         "name": scene.name,
-        "model": [_model(entry) for entry in entries],
+        "model": [_model(entry, session.time) for entry in entries],
         "camera": _camera(camera),
         "spotlight": _spotlight(light),
         "render": render,
@@ -77,10 +79,12 @@ def _graph(graph: str) -> str:
     return str(Path(graph).resolve()) if graph.endswith(".toml") else graph
 
 
-def _model(entry: ModelEntry) -> dict[str, Any]:
+def _model(entry: ModelEntry, time: float) -> dict[str, Any]:
+    """With its motion if it is where that begins, else at rest where it is."""
     made: dict[str, Any] = {"path": str(entry.path.resolve()), "scale": entry.scale, "translate": list(entry.translate)}
     if entry.motion:
-        made["motion"] = _model_motion(entry.motion)
+        begins = np.array_equal(entry.motion.matrix(time), entry.motion.matrix(0.0))
+        made["motion"] = _model_motion(entry.motion if begins else entry.motion.held(time))
     return made
 
 

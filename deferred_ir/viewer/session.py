@@ -74,6 +74,7 @@ class Session:
         self.emission = self.spotlight.emission
 
     def _place(self, scene: Scene) -> None:
+        self.geometry = scene.geometry
         self.camera = replace(scene.camera, motion=None)
         self.spotlight = replace(scene.spotlight, motion=None)
         self.moved()
@@ -91,7 +92,7 @@ class Session:
     @property
     def shown(self) -> Scene:
         """The scene as it is drawn."""
-        return replace(self.scene, camera=self.eye, spotlight=self.spotlight)
+        return replace(self.scene, geometry=self.geometry, camera=self.eye, spotlight=self.spotlight)
 
     def moved(self) -> None:
         """Camera, light or scene have changed: all must be drawn again."""

@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from .errors import SceneError
+from .geometry import Geometry, Model
 from .models import ModelData, Part
 from .motion import ModelMotion
-from .scene import Geometry, Material, Model, Texture
+from .scene import Material, Texture
 from .typing import Array
 
 

@@ -101,7 +101,7 @@ class Rays:
 
     def occluded(self, origins: Array, ways: Array, reach: Array) -> Bools:
         """Whether anything is met within `reach` (n,) lengths of the directions, bool (n,)."""
-        hidden = np.asarray(self._scene.run(origins, ways, dists=reach.copy(), query="OCCLUDED")) == 0
+        hidden: Bools = np.asarray(self._scene.run(origins, ways, dists=reach.copy(), query="OCCLUDED")) == 0
         for body in self._bodies:
             free = np.flatnonzero(~hidden)
             free = free[body.near(origins[free], ways[free], reach[free])]

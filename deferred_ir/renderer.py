@@ -163,10 +163,12 @@ class Renderer:
         if self._closed:
             raise SettingError("Renderer: is closed; make a new one")
         with self.gpu.ctx:
+            start = clock.perf_counter()
             placed = scene.at(time).centred
+            moved = clock.perf_counter()
             self._upload(placed)
             assert self._buffers
-            start = clock.perf_counter()
+            start += clock.perf_counter() - moved  # once a scene: not what a frame costs
             self._buffers.move(placed.geometry)
             frame = Frame(
                 self.size,

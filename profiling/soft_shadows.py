@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.camera import Camera
+from deferred_ir.geometry import Geometry, Model
 from deferred_ir.image import Image
 from deferred_ir.lights import Spotlight
 from deferred_ir.metrics import relmse
@@ -25,7 +26,7 @@ from deferred_ir.path_tracer import PathTracer
 from deferred_ir.profiling.output import panels
 from deferred_ir.renderer import Renderer
 from deferred_ir.run_record import write
-from deferred_ir.scene import Geometry, Material, Model, Scene
+from deferred_ir.scene import Material, Scene
 from deferred_ir.tracing import Tracer
 from deferred_ir.typing import Array, Bools
 

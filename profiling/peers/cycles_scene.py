@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.camera import Camera
+from deferred_ir.geometry import Geometry
 from deferred_ir.lights import Spotlight, frames, one_minus_cos
 from deferred_ir.materials import srgb_table
-from deferred_ir.scene import Geometry, Material, Scene, Texture
+from deferred_ir.scene import Material, Scene, Texture
 from deferred_ir.typing import Array, Vec3
 
 POINT_POWER = 4 * np.pi

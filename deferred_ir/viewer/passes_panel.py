@@ -59,8 +59,16 @@ class PassesPanel:
             imgui.text(text)
 
     def _row(self, step: Step) -> None:
-        imgui, laps = self._imgui, self._session.laps.get(step.name)
-        self._line(step.name, (f"{laps[0]:.4g}", f"{laps[1]:.4g}") if laps else ("-", "-"))
+        imgui, laps, kept = self._imgui, self._session.laps.get(step.name), step.name in self._session.kept
+        times = (f"{laps[0]:.4g}", f"{laps[1]:.4g}") if laps else ("-", "-")
+        if kept:
+            imgui.push_style_color(imgui.Col_.text, imgui.get_style_color_vec4(imgui.Col_.text_disabled))
+        self._line(f"{step.name}: kept" if kept else step.name, times)
+        if kept:
+            imgui.pop_style_color()
+            imgui.set_item_tooltip(
+                "It did not run: nothing that it is made of had changed. The times are of its last run."
+            )
         for port, output in step.outputs.items():
             source = step.name, port
             pressed, _ = imgui.selectable(

@@ -1,7 +1,7 @@
 """What the viewer shows: a scene, its camera and light, a graph with settings, and the Renderer that draws them.
 
-Knows neither window nor controls. A change costs what it must: a frame runs only the passes whose parameters or inputs
-have changed, all of them where scene, camera or light have. Whatever fails leaves the last good picture, and `error`.
+Knows neither window nor controls. A change costs what it must: frames are reused (deferred_ir/reuse.py), so a pass runs
+only if something has changed that it is made of. Whatever fails leaves the last good picture, and `error`.
 """
 
 from __future__ import annotations
@@ -52,18 +52,19 @@ class Session:
         seed: int = 0,
     ) -> None:
         self.graph, self.settings, self.seed = graph, dict(settings or {}), seed
-        self.renderer = Renderer(size, graph, set=self.settings, window=window)
+        self.renderer = Renderer(size, graph, set=self.settings, reuse=True, window=window)
         self.error = ""
         self.version = 0
         self.progressive = self.playing = self.from_light = False
         self.accumulation: Accumulation | None = None
         self.frame_ms: deque[float] = deque(maxlen=FRAMES_KEPT)
         self.laps: dict[str, tuple[float, float]] = {}
+        self.kept: frozenset[str] = frozenset()
         self.counters: dict[str, int] = {}
         self._noise = Noise()
         self._path: Path | None = None
         self._undo: Callable[[], None] = lambda: None
-        self._stale: set[str] | None = None
+        self._still = False
         self._drawn: Plan | None = None
         self._use(scene)
         self.plan = self._planned()
@@ -95,8 +96,8 @@ class Session:
         return replace(self.scene, geometry=self.geometry, camera=self.eye, spotlight=self.spotlight)
 
     def moved(self) -> None:
-        """Camera, light or scene have changed: all must be drawn again."""
-        self._stale = None
+        """Camera, light, scene or seed have changed: the picture must be drawn again."""
+        self._still = False
 
     def look(self, camera: Camera) -> None:
         """See the scene from `camera`."""
@@ -200,31 +201,39 @@ class Session:
             self.error = str(error)
             self._undo()
             self._undo, self._drawn, self.accumulation = lambda: None, None, None
+            self._still = False
             return False
 
     def _draw(self) -> bool:
-        self.plan = self._planned()
-        stale = self._stale_steps()
-        if not stale:
+        self.plan, before = self._planned(), self._drawn
+        if self._still and self.plan is before:
             return self._accumulate()
-        if self.accumulation and stale <= readers(self.plan, self.plan.outputs["radiance"]):
+        if self.accumulation and self._still and before and self._only_late(before):
             self.accumulation.follow(self.plan)
             self.accumulation.show()
+            ran = True
         else:
-            steps = None if self.accumulation else stale
             self.accumulation = None
-            record = Record()
-            self.renderer.draw(self.shown, self.plan, seed=self.seed, record=record, steps=steps)
-            self.renderer.finish(record)
-            self._keep(record)
-        self._drawn, self._stale, self._undo = self.plan, set(), lambda: None
-        return True
+            ran = self._frame()
+        # What passes keep from frame to frame may take some to come to rest (graph `incremental`).
+        self._drawn, self._still, self._undo = self.plan, self.accumulation is not None or not ran, lambda: None
+        return ran
 
-    def _stale_steps(self) -> set[str]:
-        """The steps that must run again."""
-        if self._stale is None or self._drawn is None:
-            return {step.name for step in self.plan.steps}
-        return changed(self._drawn, self.plan)
+    def _only_late(self, before: Plan) -> bool:
+        """Whether only what is made of the mean differs from the plan `before`."""
+        return changed(before, self.plan) <= readers(self.plan, self.plan.outputs["radiance"])
+
+    def _frame(self) -> bool:
+        """Draw a frame; whether any pass had to run."""
+        record = Record()
+        self.renderer.draw(self.shown, self.plan, seed=self.seed, record=record)
+        self.renderer.finish(record)
+        kept = frozenset(self.renderer.executor.kept)
+        if len(kept) == len(self.plan.steps):
+            return False
+        self.kept = kept
+        self._keep(record)
+        return True
 
     def _accumulate(self) -> bool:
         """Nothing moves: add a frame to the mean."""

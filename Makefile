@@ -9,7 +9,7 @@ PIP    := $(BIN)/python -m pip install -qq --no-input --disable-pip-version-chec
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint types pictures bench look clean
+.PHONY: help demo test lint types pictures bench soak look clean
 
 help:  ## this list
 	@echo "deferred-ir: global illumination on OpenGL"
@@ -33,6 +33,10 @@ pictures: $(VENV)/installed-dev  ## render the pictures of README and docs again
 bench: $(VENV)/installed  ## measure how far from the limits the passes are, for docs/bench.md
 	@$(BIN)/python tools/system.py opengl
 	@$(BIN)/python tools/bench.py
+
+soak: $(VENV)/installed  ## 20,000 frames and 500 loads of scenes in one process, half an hour at most: nothing may grow
+	@$(BIN)/python tools/system.py opengl
+	@$(BIN)/python -m deferred_ir.profiling.soak
 
 look: $(VENV)/installed-dev  ## screenshot of a small report to out/report.png
 	@$(BIN)/python tools/system.py opengl

@@ -184,6 +184,7 @@ class Renderer:
             with timers.frame() if timers else nullcontext():
                 self.executor.run(plan, frame, timers, steps=steps)
             self.gpu.ctx.finish()
+            self.gpu.gl.check(f"a frame of {self.size[0]}x{self.size[1]}")
             if record and timers:
                 record.frame_ms.append((clock.perf_counter() - start) * 1e3)
                 record.laps += timers.collect()

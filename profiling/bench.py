@@ -27,6 +27,7 @@ from deferred_ir.gl.gpu import Gpu
 from deferred_ir.loading import load
 from deferred_ir.profiling.host_costs import cold_start, python_time
 from deferred_ir.profiling.limits import FOLDER, LIMITS
+from deferred_ir.profiling.output import markdown
 from deferred_ir.renderer import Renderer
 from deferred_ir.scene import Scene
 from deferred_ir.scene_file import parse_size
@@ -101,11 +102,6 @@ def digits(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 99.95 else f"{value:#.3g}"
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table."""
-    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows))
-
-
 def column(name: str, rows: Sequence[str], **options: Any) -> list[str]:
     """The cells of a scene; the medians behind its ratios go to the standard error."""
     scene, cells = load(name), [name]
@@ -147,7 +143,7 @@ def report(arguments: Sequence[str] | None = None) -> str:
         f"{device}; {os.cpu_count()} cores, Python {platform.python_version()}. {chosen.turns} turns with "
         f"{chosen.vpls} VPLs at {chosen.size[0]}x{chosen.size[1]}; median (quartiles)."
     )
-    return f"{table(head, body)}\n\n{made}"
+    return f"{markdown(head, body)}\n\n{made}"
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ disturbs them alike; times are medians on the GPU.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -21,7 +21,7 @@ from tqdm import tqdm
 from deferred_ir.loading import load
 from deferred_ir.metrics import relmse
 from deferred_ir.motion import FRAMES_PER_SECOND, LissajousMotion
-from deferred_ir.profiling.output import arguments
+from deferred_ir.profiling.output import arguments, markdown
 from deferred_ir.reference import reference
 from deferred_ir.renderer import Renderer
 from deferred_ir.scene import Scene
@@ -149,11 +149,6 @@ def _hit(renderer: Renderer) -> Bools:
     return hit
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Markdown."""
-    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows))
-
-
 def row_of_times(scene: Scene, found: Mapping[str, Any]) -> list[str]:
     """Cells of TIMES."""
     cells = [scene.name, f"{found['redone']:.1f}", f"{found['kept']:.1f}", f"{found['redone'] / found['kept']:.1f}"]
@@ -177,9 +172,9 @@ def main() -> None:
     """Measure, print."""
     chosen, sizes = arguments(__doc__, output=False).parse_args(), Sizes()
     scenes = [moving(load(name)) for name in chosen.scenes]
-    print(table(TIMES, [row_of_times(scene, times(scene, sizes.timed)) for scene in scenes]), flush=True)
+    print(markdown(TIMES, [row_of_times(scene, times(scene, sizes.timed)) for scene in scenes]), flush=True)
     found = [(scene, errors(scene, sizes.compared), flicker(scene, sizes.compared)) for scene in scenes]
-    print(f"\n{table(ERRORS, [row_of_errors(*each) for each in found])}")
+    print(f"\n{markdown(ERRORS, [row_of_errors(*each) for each in found])}")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from deferred_ir.loading import load
 from deferred_ir.profiling import bench
 from deferred_ir.profiling.host_costs import cold_start, python_time, seconds
 from deferred_ir.profiling.limits import LIMITS
+from deferred_ir.profiling.output import markdown
 from deferred_ir.timing import Record
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tools"))
@@ -76,7 +77,7 @@ def test_figures_have_three_digits(value, text):
 
 
 def test_a_table_is_markdown():
-    assert bench.table(["", "a"], [["x", "1"]]) == "|  | a |\n| --- | --- |\n| x | 1 |"
+    assert markdown(["", "a"], [["x", "1"]]) == "|  | a |\n| --- | --- |\n| x | 1 |"
 
 
 def test_graphs_take_turns_and_each_row_gets_its_cells(capsys):

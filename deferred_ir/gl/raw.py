@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from .debug import DebugOutput
 
 _U, _I, _F, _P = ctypes.c_uint, ctypes.c_int, ctypes.c_float, ctypes.c_void_p
+KINDS = "Texture", "Buffer", "Program", "VertexArray", "Framebuffer", "Sampler", "Query"
+"""Of objects that are counted."""
+HIGHEST = 1 << 13
+"""Names of objects are small numbers: beyond it none is looked for."""
 _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "ActiveTexture": (None, _U),
     "BindFramebuffer": (None, _U, _U),
@@ -40,6 +44,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "GetIntegerv": (None, _U, _P),
     "GetQueryObjectui64v": (None, _U, _U, _P),
     "GetTexImage": (None, _U, _I, _U, _U, _P),
+    **{f"Is{kind}": (ctypes.c_ubyte, _U) for kind in KINDS},
     "MemoryBarrier": (None, _U),
     "PixelStorei": (None, _U, _I),
     "QueryCounter": (None, _U, _U),
@@ -61,7 +66,7 @@ CLIP_DISTANCE0 = 0x3000
 MAX_TEXTURE_SIZE, MAX_ARRAY_LAYERS, MAX_VIEWPORT_DIMS = 0x0D33, 0x88FF, 0x0D3A
 READ_WRITE = 0x88BA
 TEXTURE_FETCH_BARRIER, IMAGE_ACCESS_BARRIER, TEXTURE_UPDATE_BARRIER, FRAMEBUFFER_BARRIER = 0x8, 0x20, 0x100, 0x400
-OUT_OF_MEMORY = 0x0505
+OUT_OF_MEMORY, CONTEXT_LOST = 0x0505, 0x0507
 DEBUG_OUTPUT, DEBUG_OUTPUT_SYNCHRONOUS, DEBUG_SOURCE_API = 0x92E0, 0x8242, 0x8246
 DEBUG_FAULTS = 0x824C, 0x824D, 0x824E
 """Types of messages: errors, deprecated and undefined behaviour."""
@@ -107,11 +112,17 @@ class GL:
         self.GetIntegerv(what, values)
         return list(values)
 
+    def objects(self) -> dict[str, int]:
+        """How many objects of each kind the context has, as OpenGL knows them."""
+        return {kind: sum(map(getattr(self, f"Is{kind}"), range(1, HIGHEST))) for kind in KINDS}
+
     def check(self, doing: str) -> None:
         """Raise DeviceError if OpenGL has an error pending: allocations fail silently otherwise."""
         error = self.GetError()
         if error:
             if self.debug:
                 self.debug.faults.clear()  # raised here
+            if error == CONTEXT_LOST:
+                raise DeviceError(f"{doing}: the driver was reset and the context is lost; make another Renderer")
             kind = "out of memory" if error == OUT_OF_MEMORY else f"OpenGL error 0x{error:04x}"
             raise DeviceError(f"{doing}: {kind}; use a smaller size or fewer VPLs")

@@ -31,7 +31,7 @@ class Frame:
     """What a pass may know of a frame. `scene` has camera and light at `time` [s]; `buffers` is it on the GPU.
 
     reuse: what the last frame left may be used again where it would come out the same.
-    by_view: what this camera's view does not need may be left out, for the next frame is drawn afresh.
+    keep_all: nothing may be left out that another scene or view would need.
     """
 
     size: tuple[int, int]
@@ -41,8 +41,13 @@ class Frame:
     seed: int = 0
     time: float = 0.0
     reuse: bool = False
-    by_view: bool = False
+    keep_all: bool = False
     _surfaces: dict[tuple[GpuTexture, GpuTexture], Surfaces] = field(default_factory=dict, init=False)
+
+    @property
+    def by_view(self) -> bool:
+        """Whether what this camera's view does not need may be left out: the next frame is drawn afresh."""
+        return not (self.reuse or self.keep_all)
 
     @property
     def near(self) -> float:

@@ -122,9 +122,13 @@ class FullscreenPass(Pass):
         """Uniform values; parameters by default."""
         return {name: getattr(self.params, name) for name in specs(self.Params)}
 
+    def defines(self, frame: Frame) -> Mapping[str, int | float]:
+        """Defines that choose a variant of the shader for this frame; none by default."""
+        del frame
+        return NO_DEFINES
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Draw the fullscreen triangle."""
-        del frame
-        program = io.program(self.fragment, self.vertex)
+        program = io.program(self.fragment, self.vertex, defines=self.defines(frame))
         program.set(**self.uniforms())
         program.draw_fullscreen()

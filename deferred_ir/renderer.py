@@ -170,16 +170,7 @@ class Renderer:
             assert self._buffers
             start += clock.perf_counter() - moved  # once a scene: not what a frame costs
             self._buffers.move(placed.geometry)
-            frame = Frame(
-                self.size,
-                placed,
-                self._buffers,
-                self.tracer,
-                seed,
-                time,
-                reuse=self.reuse,
-                by_view=not (self.reuse or self._keep_all),
-            )
+            frame = Frame(self.size, placed, self._buffers, self.tracer, seed, time, self.reuse, self._keep_all)
             timers = self._timers if record else None
             with timers.frame() if timers else nullcontext():
                 self.executor.run(plan, frame, timers, steps=steps)
@@ -235,7 +226,7 @@ class Renderer:
         if not (self._scene and _same_surfaces(scene, self._scene)):
             self._forget()
             self.reset()
-            self._buffers = SceneBuffers(self.gpu, scene)
+            self._buffers = SceneBuffers(self.gpu, scene, general=self._keep_all)
         self._scene = scene
 
     def tracer(self) -> Tracer:

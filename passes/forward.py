@@ -12,11 +12,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from deferred_ir import variants
 from deferred_ir.dropping import in_order, shining
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
 from deferred_ir.io import Io
-from deferred_ir.lights import LIGHTS_PER_BLOCK, is_disc
+from deferred_ir.lights import LIGHTS_PER_BLOCK
 from deferred_ir.params import param
 from deferred_ir.typing import Ints
 
@@ -72,12 +73,10 @@ class Forward(Pass):
             io["spot"][0].bind(FIRST_MAP, compare)
         if io["blockers"]:
             io["blockers"][0].bind(FIRST_MAP + 1, io.gpu.sampler(linear=False))
-        frame.buffers.draw(
-            io.program(
-                "forward.frag", "scene.vert", defines={"DIRECT": 1, "DISC": int(is_disc(lights.records)), **defines}
-            )
-        )
-        program = io.program("forward.frag", "scene.vert", defines={"DIRECT": 0, "DISC": 0, **defines})
+        direct = {"DIRECT": 1, **defines, **variants.of_spotlight(frame, lights.records)}
+        frame.buffers.draw(io.program("forward.frag", "scene.vert", defines=direct))
+        indirect = {"DIRECT": 0, "DISC": 0, **defines, **variants.of_pixels(frame, lights.records[1:])}
+        program = io.program("forward.frag", "scene.vert", defines=indirect)
         for rows in _groups(lights.records, group):
             for i, tile in enumerate(lights.records["tile"][rows].astype(int) if io["vpls"] else ()):
                 io["vpls"][tile].bind(FIRST_MAP + i, compare)

@@ -16,6 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from deferred_ir import variants
 from deferred_ir.dropping import last_shining
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
@@ -82,7 +83,9 @@ class Gather(Pass):
         side = frame.seed & 1, frame.seed >> 1 & 1
         windows = (io["depth"].version, io["normals"].version, shares, angle, side) if frame.reuse else None
         known = windows is not None and io["missing"].kept == windows
-        program = io.program("gather.frag", defines={"KEEP": int(frame.reuse), "KNOWN": int(known)})
+        defines = variants.of_pixels(frame, vpls.records)
+        kept = {"SMOOTH": defines["SMOOTH"], "KEEP": int(frame.reuse), "KNOWN": int(known)}
+        program = io.program("gather.frag", defines=kept)
         program.set(
             cosine_squared=cos(angle) ** 2,
             sine_squared=sin(angle / 2) ** 2,
@@ -95,7 +98,7 @@ class Gather(Pass):
         if io["rays"]:
             gpu.barrier()
             return
-        program = io.program("thin.frag", "thin.vert")
+        program = io.program("thin.frag", "thin.vert", defines=defines)
         gpu.clip(1)  # to the rows that the list fills
         gpu.gl.ColorMask(0, 0, 0, 0)  # the shader stores where each pixel belongs
         block = vpls.description.block

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from deferred_ir import variants
 from deferred_ir.dropping import last_shining
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Facts, Input, Output, Pass, Texture
@@ -45,7 +46,7 @@ class Interleaved(Pass):
         """A draw for each share, or more where it crosses from block to block of the buffer."""
         vpls, n = io["vpls"], int(io.defines["INTERLEAVE"])
         ctx, block = io.gpu.ctx, vpls.description.block
-        program = io.program("interleaved.frag")
+        program = io.program("interleaved.frag", defines=variants.of_pixels(frame, vpls.records))
         io.framebuffer.clear_color()
         ctx.enable(ctx.BLEND)
         ctx.blend_func = ctx.ONE, ctx.ONE

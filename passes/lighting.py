@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from deferred_ir import variants
 from deferred_ir.dropping import last_shining
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
 from deferred_ir.io import Io
-from deferred_ir.lights import LIGHTS_PER_BLOCK, is_disc
+from deferred_ir.lights import LIGHTS_PER_BLOCK
 
 
 class Lighting(Pass):
@@ -43,14 +44,15 @@ class Lighting(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """One fullscreen draw a block of lights."""
-        del frame
         ctx, lights = io.gpu.ctx, io["lights"]
-        program = io.program("lighting.frag", defines={"DISC": int(is_disc(lights.records))})
+        records = lights.records
+        defines = variants.of_pixels(frame, records[1:]) | variants.of_spotlight(frame, records)
+        program = io.program("lighting.frag", defines=defines)
         ctx.blend_func = ctx.ONE, ctx.ONE
-        total = 1 if io["indirect"] else len(lights.records)
+        total = 1 if io["indirect"] else len(records)
         for start in range(0, total, LIGHTS_PER_BLOCK):
             first = int(start == 0)
-            count = last_shining(lights.records[start + first : min(start + LIGHTS_PER_BLOCK, total)])
+            count = last_shining(records[start + first : min(start + LIGHTS_PER_BLOCK, total)])
             if not first and not count:
                 continue
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, get_args
 
+from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Texture
 from deferred_ir.io import FullscreenPass
 from deferred_ir.params import param
@@ -42,6 +43,12 @@ class Tonemap(FullscreenPass):
     def depends(self) -> frozenset[str]:
         """Nothing else."""
         return frozenset()
+
+    def defines(self, frame: Frame) -> Mapping[str, int | float]:
+        """The operator and who exposes: no pixel has code for the others."""
+        given = self.uniforms()
+        chosen = {"OPERATOR": given["operator_number"], "AUTOMATIC": int(given["automatic"])}
+        return {} if frame.keep_all else chosen
 
     def uniforms(self) -> Mapping[str, Any]:
         """The operator as its number."""

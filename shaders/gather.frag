@@ -59,8 +59,7 @@ Centre centre(ivec2 pixel, ivec2 size) {
     c.size = size;
     c.depth = texelFetch(depth, pixel, 0).r;
     vec4 code = texelFetch(normals, pixel, 0);
-    c.shading_normal = from_octahedral(code.xy);
-    c.normal = from_octahedral(code.zw);
+    decode_normals(code, c.shading_normal, c.normal);
     c.across = frame.ray[0].xyz * (2.0 / float(size.x));
     c.up = frame.ray[1].xyz * (2.0 / float(size.y));
     c.ray = frame.ray[0].xyz * ndc.x + frame.ray[1].xyz * ndc.y + frame.ray[2].xyz;

@@ -34,7 +34,8 @@ void main() {
     }
     vec3 position = unproject((vec2(pixel) + 0.5) / vec2(size) * 2.0 - 1.0, d);
     vec4 code = texelFetch(normals, pixel, 0);
-    vec3 shading_normal = from_octahedral(code.xy), normal = from_octahedral(code.zw);
+    vec3 shading_normal, normal;
+    decode_normals(code, shading_normal, normal);
     vec3 sum = vec3(0.0);
     for (int i = first; i < end; ++i)
         sum += vpl_irradiance(lights[i], position, normal, shading_normal) * VISIBILITY(i);

@@ -33,7 +33,8 @@ void main() {
     }
     vec3 position = unproject(ndc, d);
     vec4 code = texelFetch(normals, pixel, 0);
-    vec3 shading_normal = from_octahedral(code.xy), normal = from_octahedral(code.zw);
+    vec3 shading_normal, normal;
+    decode_normals(code, shading_normal, normal);
     vec3 irradiance = vec3(0.0);
 #if HAS_SPOTLIGHT
     if (first == 1) irradiance = lights[0].emission * texelFetch(spotlight, pixel, 0).r;
@@ -51,9 +52,11 @@ void main() {
 #if HAS_NEAR_FIELD
     if (first == 1) irradiance += texelFetch(near_field, pixel, 0).rgb;
 #endif
+#if !HAS_INDIRECT
     for (int i = first; i < count; ++i)
         irradiance += vpl_irradiance(lights[i], position, normal, shading_normal)
                     * VPL_VISIBILITY(lights[i]);
+#endif
 #endif
     radiance = vec4(texelFetch(albedo, pixel, 0).rgb * irradiance * INVERSE_PI, 1.0);
 }

@@ -16,7 +16,8 @@ void main() {
     ivec2 pixel = thin_place(imageLoad(thin, place).r, size.x);
     vec3 position = unproject((vec2(pixel) + 0.5) / vec2(size) * 2.0 - 1.0, texelFetch(depth, pixel, 0).r);
     vec4 code = texelFetch(normals, pixel, 0);
-    vec3 shading_normal = from_octahedral(code.xy), normal = from_octahedral(code.zw);
+    vec3 shading_normal, normal;
+    decode_normals(code, shading_normal, normal);
     vec3 sum = vec3(0.0);
     uvec2 bits = imageLoad(missing, pixel).rg;
     const int shares = INTERLEAVE * INTERLEAVE;

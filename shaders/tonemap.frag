@@ -1,6 +1,9 @@
 // Exposure, tone curve, sRGB.
 layout(binding = UNIT_RADIANCE) uniform sampler2D radiance;
+#ifndef OPERATOR
 uniform int operator_number;  // neutral, reinhard, aces, none
+#define OPERATOR operator_number
+#endif
 
 layout(location = 0) out vec4 color;
 flat in float exposure;
@@ -40,8 +43,8 @@ vec3 srgb(vec3 c) {
 void main() {
     vec3 c = texelFetch(radiance, ivec2(gl_FragCoord.xy), 0).rgb * exposure;
     c = min(c, 1e6);  // the curves square their argument
-    if (operator_number == 0) c = neutral(c);
-    else if (operator_number == 1) c = reinhard(c);
-    else if (operator_number == 2) c = aces(c);
+    if (OPERATOR == 0) c = neutral(c);
+    else if (OPERATOR == 1) c = reinhard(c);
+    else if (OPERATOR == 2) c = aces(c);
     color = vec4(srgb(c), 1.0);
 }

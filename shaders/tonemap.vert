@@ -1,6 +1,9 @@
 // One triangle that covers the target, and the exposure, which is the same for all of it.
 layout(binding = UNIT_RADIANCE) uniform sampler2D radiance;
+#ifndef AUTOMATIC
 uniform bool automatic;
+#define AUTOMATIC automatic
+#endif
 uniform float scale;
 flat out float exposure;
 
@@ -23,6 +26,7 @@ float automatic_exposure() {
 }
 
 void main() {
-    exposure = automatic ? automatic_exposure() : scale;
+    if (bool(AUTOMATIC)) exposure = automatic_exposure();
+    else exposure = scale;
     gl_Position = vec4((gl_VertexID & 1) * 4 - 1, (gl_VertexID & 2) * 2 - 1, 0.0, 1.0);
 }

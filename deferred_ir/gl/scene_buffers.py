@@ -30,19 +30,32 @@ OWN = "own"
 
 
 class SceneBuffers:
-    """Indexed triangles with what shaders read of each face. `defines` say which attributes there are."""
+    """Indexed triangles with what shaders read of each face.
 
-    def __init__(self, gpu: Gpu, scene: Scene) -> None:
+    defines: say what there is of attributes, materials and textures, so that shaders have nothing for the rest.
+    general: there are normals and texture coordinates in any case, with values that change nothing, and shaders are
+    those for any scene.
+    """
+
+    def __init__(self, gpu: Gpu, scene: Scene, *, general: bool = False) -> None:
         self.gpu, g = gpu, scene.geometry
         self._geometry = g
+        uvs = g.uvs if scene.textures else None
+        arrays = {"position": g.positions, "normal": g.normals, "color": g.colors, "uv": uvs}
+        if general:
+            count = len(g.positions)
+            # No normal: the face's counts. Without a texture nothing is looked up at `uv`. There is no such colour: an
+            # interpolated 1 is not quite 1.
+            neutral = {"normal": np.zeros((count, 3)), "uv": np.zeros((count, 2))}
+            arrays |= {name: array for name, array in neutral.items() if arrays[name] is None}
+        self._ranges = _ranges(scene)
         self.defines = {
-            "HAS_NORMALS": int(g.normals is not None),
-            "HAS_UVS": int(bool(scene.textures) and g.uvs is not None),
-            "HAS_COLORS": int(g.colors is not None),
+            "HAS_NORMALS": int(arrays["normal"] is not None),
+            "HAS_UVS": int(arrays["uv"] is not None),
+            "HAS_COLORS": int(arrays["color"] is not None),
+            "ONE_MATERIAL": int(len(scene.materials) == 1 and not general),
+            "ALL_TEXTURED": int(all(texture is not None for texture, _, _ in self._ranges) and not general),
         }
-        arrays = {"position": g.positions, "normal": g.normals, "color": g.colors}
-        if self.defines["HAS_UVS"]:
-            arrays["uv"] = g.uvs
         ctx = gpu.ctx
         self._attributes = {
             name: (ctx.buffer(np.ascontiguousarray(array, "f4").tobytes()), f"{array.shape[1]}f")
@@ -55,7 +68,6 @@ class SceneBuffers:
         self._faces, self._materials = ctx.buffer(faces.tobytes()), ctx.buffer(materials.tobytes())
         gpu.gl.check(f"scene '{scene.name}' with {len(g.faces)} triangles")
         self._textures = [self._upload(texture) for texture in scene.textures]
-        self._ranges = _ranges(scene)
         self.face_count = len(g.faces)
         buffers = [*(buffer for buffer, _ in self._attributes.values()), self._indices, self._faces, self._materials]
         self._buffers = buffers

@@ -20,6 +20,20 @@ vec3 from_octahedral(vec2 code) {
     return normalize(octahedron(code));
 }
 
+#ifndef SMOOTH  // 0: the scene has no shading normals, so both are one
+#define SMOOTH 1
+#endif
+
+// What a texel of `normals` holds.
+void decode_normals(vec4 code, out vec3 shading, out vec3 geometric) {
+    geometric = from_octahedral(code.zw);
+#if SMOOTH
+    shading = from_octahedral(code.xy);
+#else
+    shading = geometric;
+#endif
+}
+
 vec4 encode_normals(vec3 shading, vec3 geometric) {
     return vec4(octahedral(shading), octahedral(geometric));
 }

@@ -21,6 +21,10 @@ float disc_radius(Light spotlight) {
     return spotlight.clamp_squared;
 }
 
+#ifndef CLAMPED  // 0: no VPL's clamp_squared is above 0
+#define CLAMPED 1
+#endif
+
 const float INVERSE_PI = 0.318309886;
 const float TINY = 1e-37;  // keeps a squared distance off 0, where position and light coincide and the cosines are 0
 
@@ -49,6 +53,11 @@ vec3 vpl_irradiance(Light light, vec3 position, vec3 normal, vec3 shading_normal
     float leaving = max(dot(light.z_axis, from), 0.0), edge = 1.0 - light.one_minus_cos;
     float inside = step(edge * edge * square, leaving * leaving);
     float cosines = leaving * receiving(-from, normal, shading_normal);
+#if CLAMPED
+    float held = max(square, light.clamp_squared);
+#else
+    float held = square;
+#endif
     // The cosines bring a distance each. Two divisions: the fourth power of a small distance would vanish.
-    return light.emission * (inside * cosines / max(square, TINY) / max(max(square, light.clamp_squared), TINY));
+    return light.emission * (inside * cosines / max(square, TINY) / max(held, TINY));
 }

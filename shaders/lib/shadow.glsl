@@ -3,12 +3,17 @@
 // A planar map covers the light's cone by a perspective projection, with reversed depth along its axis (lib/depth.glsl).
 // A paraboloid map (Brabec et al. 2002), which can be as wide as the hemisphere, is the stereographic projection of the
 // directions: the cone's edge is the circle of radius 1, and the depth is near / distance. VPLs' maps are paraboloid
-// where VPL_PARABOLOID is 1; the spotlight's is where it is wider than WIDE_SPOT says, whatever those of the VPLs are.
+// where VPL_PARABOLOID is 1; the spotlight's is where it is wider than WIDE_SPOT says, whatever those of the VPLs are, and
+// SPOT_PARABOLOID tells it where it is known.
 #include "lib/frame.glsl"
 #include "lib/light.glsl"
 
 bool spot_paraboloid(Light light) {
+#ifdef SPOT_PARABOLOID
+    return SPOT_PARABOLOID == 1;
+#else
     return light.one_minus_cos > WIDE_SPOT;
+#endif
 }
 
 // What the map's coordinates of a point at `d` from the light are divided by: its depth along the axis in a planar map.

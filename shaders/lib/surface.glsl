@@ -16,7 +16,9 @@ in vec3 vertex_color;
 #if HAS_UVS
 in vec2 texture_uv;
 layout(binding = 15) uniform sampler2D albedo_texture;
+#if !ALL_TEXTURED
 uniform bool textured;
+#endif
 #endif
 
 struct Surface {
@@ -43,12 +45,19 @@ Surface surface() {
         s.shading_normal = dot(n, s.normal) < 0.0 ? -n : n;
     }
 #endif
+#if ONE_MATERIAL
+    s.albedo = materials[0].rgb;
+#else
     s.albedo = materials[int(face.w)].rgb;
+#endif
 #if HAS_COLORS
     s.albedo *= vertex_color;
 #endif
 #if HAS_UVS
-    if (textured) s.albedo *= texture(albedo_texture, texture_uv).rgb;
+#if !ALL_TEXTURED
+    if (textured)
+#endif
+        s.albedo *= texture(albedo_texture, texture_uv).rgb;
 #endif
     return s;
 }

@@ -50,6 +50,11 @@ class Frame:
         return not (self.reuse or self.keep_all)
 
     @property
+    def smooth(self) -> bool:
+        """Whether shading normals may differ from the faces'."""
+        return self.buffers.defines["HAS_NORMALS"] == 1
+
+    @property
     def near(self) -> float:
         """Near plane of the camera and of all lights, in world units."""
         return NEAR * self.scene.geometry.diagonal

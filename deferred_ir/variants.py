@@ -15,7 +15,7 @@ from .maps import WIDE
 def of_pixels(frame: Frame, vpls: np.ndarray) -> dict[str, int | float]:
     """For pixels that VPLs light, LIGHT records (n,): whether there are shading normals, and a clamp."""
     clamped = frame.keep_all or not len(vpls) or bool(vpls["clamp_squared"][0] > 0)
-    return {"SMOOTH": frame.buffers.defines["HAS_NORMALS"], "CLAMPED": int(clamped)}
+    return {"SMOOTH": int(frame.smooth), "CLAMPED": int(clamped)}
 
 
 def of_spotlight(frame: Frame, lights: np.ndarray) -> dict[str, int | float]:

@@ -109,6 +109,12 @@ class Geometry:
         return self._rest.groups if self._rest else groups(self.faces, [model.vertices for model in self.moving])
 
     @cached_property
+    def boxes(self) -> Array:
+        """Corners (minimum, maximum) of each moving model where it is, float64 (m, 2, 3)."""
+        found = [corners(self.positions[model.vertices]) for model in self.moving]
+        return np.reshape(found, (len(found), 2, 3))
+
+    @cached_property
     def face_normals(self) -> Array:
         """Unit geometric normals by winding, float64 (F, 3); +y for a degenerate face, which covers no pixel."""
         if not self._rest:

@@ -5,6 +5,9 @@ frame sites that the light no longer reaches are given up at once, and a few new
 carries the light of its Voronoi cell, so all of the light is accounted for however many sites there are.
 
 A ray that misses stands for its site, too: the light of its cell is lost, and the hole is not tried again.
+
+Where models move, VPLs on them and those that they hide from the light are given up. Maps that show a model where
+it was are drawn again within the budget, the oldest first.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from .disc_cells import Cells, most_crowded
 from .emission_disc import EmissionDisc
 from .lights import Spotlight, frames
 from .sampling import disc as unit_disc
+from .stale_maps import StaleMaps
 from .tracing import Tracer
 from .typing import Array, Bools, Ints
 from .versions import new_version, new_versions
@@ -31,8 +35,8 @@ GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])
 class IncrementalVpls:
     """At most `count` sites and what the rays through them met. Slot i keeps its VPL until that is given up.
 
-    The same `seed` and the same frames give the same VPLs again. at_rest: the last frame changed no site, so the next
-    one will not either if nothing moves.
+    The same `seed` and the same frames give the same VPLs again. at_rest: the last frame changed no site and left no
+    map stale, so the next one will not change anything either if nothing moves.
     """
 
     at_rest = False
@@ -42,6 +46,7 @@ class IncrementalVpls:
         self._offset, self._born = self._rng.random(2), 0
         self._right: Array = np.zeros(3)
         self._spot: tuple[object, int] = None, 0
+        self._maps, self._group = StaleMaps(count), np.zeros(count, np.intp)
         self.weights = np.zeros(count)
         self.used = np.zeros(count, bool)
         self.landed = np.zeros(count, bool)
@@ -52,12 +57,14 @@ class IncrementalVpls:
     def update(self, light: Spotlight, tracer: Tracer, *, least: int, most: int) -> Vpls:
         """The VPLs of the next frame, `ray` being their slots.
 
-        light: where it is now. most: sites that may be new, and so maps; least: sites that may be new or moved to where
-        they are of more use, as long as that is not more than `most`.
+        light: where it is now. most: maps that may be drawn, of new sites or of those that show a model where it was;
+        half of it is the latter's if they need it. least: sites that may be new or moved to where they are of more
+        use, as far as `most` goes.
         """
         self._turn(light)
         disc = EmissionDisc(light, self._axes(light))
-        self.used &= self._reached(light, tracer, disc)
+        self._give_up(light, tracer, disc)
+        whole, most = most, most - min(most // 2, int(self._maps.stale.sum()))
         slots = np.flatnonzero(self.used)
         cells = Cells(disc.points(self.direction[slots]))
         free = np.flatnonzero(~self.used)[:most]
@@ -72,8 +79,24 @@ class IncrementalVpls:
         place = np.zeros((len(self.used), 2))
         place[slots] = cells.sites
         self._shoot(light, tracer, fresh, disc.directions(place[fresh]))
-        self.at_rest = not len(fresh)
+        again = self._maps.oldest(np.flatnonzero(self._shines()), whole - len(fresh))
+        self.version[again] = new_versions(len(again))
+        self._maps.drawn(np.union1d(fresh, again))
+        self.at_rest = not len(fresh) and not self._maps.stale.any()
         return self._lit(light, disc.power)
+
+    def _give_up(self, light: Spotlight, tracer: Tracer, disc: EmissionDisc) -> None:
+        """Begin a frame: what the light does not reach any more, what lies on a model that has moved, stale maps."""
+        moved = self._maps.follow(tracer.scene.geometry)
+        self.used &= self._reached(light, tracer, disc) & ~np.append(False, moved)[self._group]
+        self._maps.stale = (self._maps.stale | self._maps.see(self.position, self.normal)) & self._shines()
+        if self._maps.see(np.array([light.position]), light.axis[None]).any():
+            self._spot = None, 0
+
+    def _shines(self) -> Bools:
+        """Which slots have a VPL, and so a map."""
+        shines: Bools = self.used & self.landed & (self.albedo > 0).any(axis=1)
+        return shines
 
     def spot_version(self, light: Spotlight) -> int:
         """A number that changes when the spotlight sees something else than before."""
@@ -149,13 +172,14 @@ class IncrementalVpls:
         self.direction[slots] = directions
         hits = tracer.closest(self._origins(light)[slots], directions)
         self.used[slots], self.landed[slots] = True, hits.hit
+        self._group[slots] = np.where(hits.hit, tracer.scene.geometry.groups[hits.face], 0)
         self.position[slots], self.albedo[slots] = hits.position, hits.albedo
         self.normal[slots], self.shading_normal[slots] = hits.normal, hits.shading_normal
         self.version[slots] = new_versions(len(slots))
 
     def _lit(self, light: Spotlight, power: float) -> Vpls:
         """What is there; each VPL carries the light of its cell."""
-        slots = np.flatnonzero(self.used & self.landed & (self.albedo > 0).any(axis=1))
+        slots = np.flatnonzero(self._shines())
         direction = self.direction[slots]
         carried = np.multiply.outer(power * self.weights[slots], np.asarray(light.emission, float))
         arriving = np.maximum(-(self.shading_normal[slots] * direction).sum(axis=1), 0)

@@ -73,7 +73,7 @@ class KeptMaps:
             elif self.versions is None:
                 told.append(parts[place])
             elif dirty:
-                told.append({**parts[place], "state": "dirty", "why": "its light is new, or has moved"})
+                told.append({**parts[place], "state": "dirty", "why": "its light is new, or it or a model has moved"})
             else:
                 told.append({**parts[place], "state": "kept", "why": "its light stays"})
         return told

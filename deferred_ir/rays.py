@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .errors import DeviceError
-from .geometry import Geometry, corners, middle
+from .geometry import Geometry, middle
 from .typing import Array, Bools, Ints
 
 INFINITE = 1e37
@@ -67,8 +67,8 @@ class Rays:
     def pose(self, geometry: Geometry) -> None:
         """Go on with the same triangles, posed in another way."""
         self._bodies = []
-        for i, (model, pose) in enumerate(zip(geometry.moving, geometry.poses, strict=True)):
-            low, high = corners(geometry.positions[model.vertices])
+        for i, pose in enumerate(geometry.poses):
+            low, high = geometry.boxes[i]
             slack = SLACK * (np.abs([low, high]).max() + np.linalg.norm(high - low))
             turn = pose[:3, :3].T
             shift = -turn @ pose[:3, 3] - self._centres[i]

@@ -58,7 +58,7 @@ class IncrementalVpl(Pass):
             lights.kept = None
             lights.write(packed(frame.scene, NONE, p, NONE.ray))
             return
-        key = p, frame.seed, frame.scene.geometry
+        key = p, frame.seed
         if lights.kept is None or lights.kept[0] != key:
             lights.kept = key, IncrementalVpls(p.count, frame.seed)
         state: IncrementalVpls = lights.kept[1]

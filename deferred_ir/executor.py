@@ -1,7 +1,7 @@
 """Runs plans: allocates what `planning.compile` planned, binds each pass's ports by name, and times the passes.
 
-Resources are kept by (pass, port, description) and survive a new plan that still has them; programs are kept by source
-and defines.
+Resources are kept by (pass, port, description, type of pass) and survive a new plan that still has them; programs are
+kept by source and defines.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .gl.gpu import Gpu
 from .gl.resources import Framebuffer, GpuBuffer, GpuTexture
 from .gl.shaders import ShaderLibrary
 from .gl.timers import Timers
-from .graph import Buffer, Description, Plan, Step, Texture
+from .graph import Buffer, Description, Pass, Plan, Step, Texture
 from .io import Io, Resource
 from .reuse import Runs
 
@@ -33,6 +33,10 @@ class Watch(Protocol):
         """After."""
 
 
+Key = tuple[str, str, Description, tuple[int, int] | None, type[Pass]]
+"""Of a resource: pass, port, what it is, and who writes it, since what a pass keeps there another one cannot read."""
+
+
 class Executor:
     """Owns what a plan needs on the GPU. `counters` holds what the passes published in the last frame."""
 
@@ -41,7 +45,7 @@ class Executor:
         self.library = ShaderLibrary(gpu)
         self.counters: Counter[str] = Counter()
         self._frame_block = gpu.ctx.buffer(reserve=FRAME.itemsize, dynamic=True)
-        self._resources: dict[tuple[str, str, Description, tuple[int, int] | None], Resource] = {}
+        self._resources: dict[Key, Resource] = {}
         self._framebuffers: list[Framebuffer] = []
         self._plan: Plan | None = None
         self._size = (0, 0)
@@ -131,7 +135,7 @@ class Executor:
         """Make the plan's resources and framebuffers; what the last plan had and this one has stays."""
         self._plan = None  # if an allocation fails, the next frame starts over
         keys = {
-            (step.name, port, output.description, _size(output.description, size))
+            (step.name, port, output.description, _size(output.description, size), type(step.work))
             for step in plan.steps
             for port, output in step.outputs.items()
         }

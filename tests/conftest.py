@@ -62,19 +62,19 @@ def renderer() -> Iterator[Callable[..., Renderer]]:
         one.close()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def screen() -> Iterator[str]:
-    """A virtual display."""
+    """A virtual display of this process's own."""
     from virtual_display import display
 
     with display() as name:
         yield name
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def viewer_window(screen: str) -> Iterator[Any]:
-    """One window for all tests of a file."""
-    from virtual_display import FEW, SIZE, xdo
+    """One window for all tests; at the end it is closed while a reference is traced."""
+    from virtual_display import FEW, SIZE, close_renderer, xdo
 
     from deferred_ir.gl.window import Window
     from deferred_ir.loading import load
@@ -88,27 +88,20 @@ def viewer_window(screen: str) -> Iterator[Any]:
     viewer.frame()
     xdo("search", "--sync", "--name", "deferred-ir test", "windowfocus", "--sync")
     yield viewer
+    viewer.panel.truth.start()
+    viewer.frame()
     viewer.close()
+    assert not viewer.panel.truth.truth.running
+    close_renderer()
 
 
 @pytest.fixture
 def viewer(viewer_window: Any) -> Iterator[Any]:
     """The window with the Cornell box as it was at first."""
-    from virtual_display import FEW, SIZE, act, xdo
+    from virtual_display import restore
 
-    from deferred_ir.viewer.panel import WIDTH
-
-    shared = viewer_window
-    session = shared.session
-    session.open("cornell")
-    session.change("deferred", FEW)
-    session.from_light = session.playing = session.progressive = False
-    shared.controls.switches.update(frames=False, map=False, panel=True)
-    shared.window.resize((SIZE[0] + WIDTH, SIZE[1]))
-    xdo("mousemove", 5, 5)
-    act(shared, "mousemove", 20, 20)
-    assert session.size == SIZE
-    assert session.error == ""
+    shared, session = viewer_window, viewer_window.session
+    restore(shared)
     yield shared
     with session.renderer.gpu.ctx:
         assert session.renderer.gpu.ctx.error == "GL_NO_ERROR"

@@ -228,3 +228,13 @@ def test_windows_that_are_kept_with_the_g_buffer_give_the_same_pixels(renderer, 
         windows = one.executor.resource(("gather", "missing")).kept if step else None
         np.testing.assert_array_equal(*(made.render(scene, seed=3).radiance for made in (one, other)))
         assert (one.executor.resource(("gather", "missing")).kept == windows) == (step in (1, 2, 4))
+
+
+def test_a_pass_of_another_type_starts_afresh(renderer):
+    """`incremental` and `deferred` both have a pass `vpl`, and each keeps its own kind of thing from frame to frame."""
+    one = renderer(SIZE, set=SETTINGS, reuse=True)
+    expected = one.render(ROOM).radiance
+    for graph in ("incremental", "deferred"):
+        one.configure(graph=graph)
+        found = one.render(ROOM).radiance
+    np.testing.assert_array_equal(found, expected)

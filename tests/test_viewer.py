@@ -49,11 +49,9 @@ def test_without_a_display_it_names_render():
         (["--screenshot", "a.jpg", "--frames", "1"], "a.jpg: a screenshot is written as .png"),
     ],
 )
-def test_options_that_make_no_sense_are_told(options, message):
-    command = [sys.executable, "-m", "deferred_ir", "view", *options]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert message in done.stderr
+def test_options_that_make_no_sense_are_told(options, message, capsys):
+    assert cli.main(["view", *options]) == 2
+    assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("key", "scene"), [(2, "atrium"), (3, "colors"), (1, "cornell")])

@@ -7,41 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-from virtual_display import FEW, SIZE, act, frames, picture, rendered, xdo
+from virtual_display import FEW, SIZE, Spy, act, frames, middle, picture, rendered, xdo
 
 from deferred_ir import cli
-from deferred_ir.lights import LIGHT
+from deferred_ir.exposure import automatic_stops
+from deferred_ir.lights import LIGHT, NEAR
 from deferred_ir.loading import load
 from deferred_ir.viewer import frames as local_frames
 from deferred_ir.viewer import panel as panels
-
-
-class Spy:
-    """Dear ImGui, which notes where in the window a widget is."""
-
-    def __init__(self, imgui, label):
-        self._imgui, self._label, self.middle = imgui, label, None
-
-    def __getattr__(self, name):
-        found = getattr(self._imgui, name)
-
-        def call(*words, **more):
-            result = found(*words, **more)
-            if words and isinstance(words[0], str) and words[0] == self._label:
-                low = self._imgui.get_item_rect_min()
-                self.middle = round(low.x + 100), round((low.y + self._imgui.get_item_rect_max().y) / 2)
-            return result
-
-        return call if callable(found) and name.islower() else found
-
-
-def place(viewer, label):
-    """A point of the widget `label`, about its middle."""
-    before = viewer.panel._imgui
-    viewer.panel._imgui = spy = Spy(before, label)
-    viewer.frame()
-    viewer.panel._imgui = before
-    return spy.middle
 
 
 def test_a_parameter_rebuilds_nothing_and_runs_only_what_reads_it(viewer):
@@ -157,7 +130,7 @@ def test_the_shadow_map_stands_in_the_lower_left_corner(viewer):
     edge = round(0.33 * SIZE[1])
     texels = (np.arange(edge) * len(depth)) // edge
     near = depth[np.ix_(texels, texels)]
-    expected = 255 * np.divide(1e-4, near, out=np.zeros_like(near), where=near > 0).clip(0, 1)
+    expected = 255 * np.divide(NEAR, near, out=np.zeros_like(near), where=near > 0).clip(0, 1)
     corner = picture(viewer)[::-1][:edge, :edge, 0]
     assert np.abs(corner - expected).max() <= 1
 
@@ -199,15 +172,11 @@ def test_a_dark_light_leaves_passes_out_and_back(viewer):
 
 
 def test_space_averages_frames_and_a_move_starts_again(viewer):
-    from deferred_ir.renderer import Renderer
-
     act(viewer, "key", "space", frames=0)
     while not viewer.session.accumulation or viewer.session.accumulation.frames < 4:
         viewer.frame()
     assert "relMSE" in viewer.session.noise_text
-    with Renderer(SIZE, device="software", set=FEW) as renderer:
-        expected = renderer.render(load("cornell"), accumulate=4).display
-    assert np.array_equal(picture(viewer), expected)
+    assert np.array_equal(picture(viewer), rendered(load("cornell"), set=FEW, accumulate=4))
     viewer.session.adjust("tonemap.operator", "none")
     viewer.frame()
     assert viewer.session.accumulation.frames == 4, "what comes after the mean changes without starting again"
@@ -227,11 +196,36 @@ def test_the_reference_is_split_into_the_picture_and_measured(viewer):
     assert panel.truth.error == ""
     half = SIZE[0] // 2
     assert np.array_equal(picture(viewer)[:, :half], before[:, :half])
-    assert np.array_equal(picture(viewer)[:, half:], viewer.session.toned(panel.truth.result.radiance)[::-1, half:, :3])
-    assert 0 < panel._distance() < 1
+    result, stops = panel.truth.result, automatic_stops(viewer.session.image().radiance)
+    assert np.array_equal(picture(viewer)[:, half:], viewer.session.toned(result.radiance, stops)[::-1, half:, :3])
+    with Spy(viewer.panel) as spy:
+        viewer.frame()
+    assert any(word.startswith("relMSE 0.") for _, word in spy.calls), "in the status line, whatever is open"
     viewer.session.look(replace(viewer.session.camera, fov=50.0))
     frames(viewer, 2)
     assert not panel._fits
+
+
+def test_both_sides_of_the_split_have_the_exposure_of_the_picture(viewer):
+    """A reference four times as bright is shown two stops brighter, though the exposure is automatic."""
+    panel, session = viewer.panel.truth, viewer.session
+    panel._spp = 0
+    panel.start()
+    while panel.truth.running:
+        viewer.frame(0.02)
+    radiance = session.image().radiance
+    panel.truth.result = replace(panel.truth.result, radiance=4 * radiance)
+    frames(viewer, 2)
+    half, stops = SIZE[0] // 2, automatic_stops(radiance)
+    expected = rendered(load("cornell"), set={**FEW, "tonemap.exposure": stops + 2})
+    assert np.array_equal(picture(viewer)[:, half:], expected[:, half:])
+    same = rendered(load("cornell"), set={**FEW, "tonemap.exposure": stops}).astype(int)
+    assert np.abs(picture(viewer)[:, :half] - same[:, :half]).max() <= 1
+    session.adjust("vpl.count", 4)
+    frames(viewer, 2)
+    stops = automatic_stops(session.image().radiance)
+    expected = rendered(load("cornell"), set={"vpl.count": 8, "tonemap.exposure": automatic_stops(radiance)})
+    assert np.array_equal(picture(viewer)[:, half:], session.toned(4 * radiance, stops)[::-1, half:, :3])
 
 
 def test_a_trace_can_be_given_up(viewer):
@@ -339,7 +333,7 @@ def test_a_slider_is_dragged_by_the_mouse(viewer):
     viewer.window.resize((SIZE[0] + 380, 700))
     frames(viewer)
     before = viewer.session.spotlight
-    x, y = place(viewer, "light FOV")
+    x, y = middle(viewer, viewer.panel, "light FOV")
     xdo("mousemove", x, y)
     frames(viewer)
     act(viewer, "mousedown", 1)

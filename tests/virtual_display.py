@@ -11,6 +11,7 @@ from typing import Any
 from deferred_ir.renderer import Renderer
 from deferred_ir.scene import Scene
 from deferred_ir.viewer.app import Viewer
+from deferred_ir.viewer.panel import WIDTH
 
 SCREEN = "1700x1000x24"
 SIZE = (128, 96)
@@ -50,8 +51,8 @@ def xdo(*words: object) -> None:
 def act(viewer: Viewer, *words: object, frames: int = 4) -> None:
     """Let xdotool make an event, and the viewer take it: Dear ImGui spreads a press and its release over frames."""
     xdo(*words)
-    for _ in range(frames):
-        viewer.frame(0.02)
+    for number in range(frames):
+        viewer.frame(0.01 if number else 0.05)
         with viewer.window:
             viewer.window.show()
 
@@ -62,13 +63,89 @@ def picture(viewer: Viewer) -> Any:
     return viewer.screenshot()[:, : area.width]
 
 
-def rendered(scene: Scene, **options: Any) -> Any:
-    """Display pixels without a window."""
-    with Renderer(SIZE, device="software", **options) as renderer:
-        return renderer.render(scene).display
+_shared: list[Renderer] = []
+
+
+def rendered(scene: Scene, size: tuple[int, int] = SIZE, graph: str = "deferred", **options: Any) -> Any:
+    """Display pixels without a window; set: {"pass.param": value}, time: seconds, accumulate: frames."""
+    if not _shared:
+        _shared.append(Renderer(size, graph, device="software"))
+    _shared[0].configure(size=size, graph=graph, set=options.pop("set", {}))
+    _shared[0].reset()
+    return _shared[0].render(scene, **options).display
+
+
+def close_renderer() -> None:
+    """End the renderer of `rendered`."""
+    while _shared:
+        _shared.pop().close()
 
 
 def frames(viewer: Viewer, count: int = 4) -> None:
     """Some frames without input."""
     for _ in range(count):
-        viewer.frame(0.02)
+        viewer.frame(0.005)
+
+
+def restore(viewer: Viewer) -> None:
+    """The window as it was at first: the Cornell box, seen and lit as its file says, and nothing else chosen."""
+    session, panel = viewer.session, viewer.panel
+    first = vars(viewer).setdefault("first", session.scene)
+    if session.scene is first:
+        session.look(first.camera)
+        session.shine(first.spotlight)
+    else:
+        session.open("cornell")
+        vars(viewer)["first"] = session.scene
+    if (session.graph, session.settings) != ("deferred", FEW) or session.error:
+        session.change("deferred", FEW)
+    session.seed, session.from_light, session.playing, session.progressive = 0, False, False, False
+    panel.truth.truth.stop()
+    panel.truth.truth.result, panel.passes.pinned, panel.maps.light, panel.saved = None, None, 0, ""
+    viewer.controls.switches.update(frames=False, map=False, panel=True)
+    viewer.window.resize((SIZE[0] + WIDTH, SIZE[1]))
+    act(viewer, "mousemove", 5, 5, "mousemove", 20, 20, frames=3)
+    assert session.size == SIZE
+    assert session.error == ""
+
+
+class Spy:
+    """Dear ImGui for one part of the panel, which notes its words, and where in the window they are; use with `with`.
+
+    places: by the first word of each call, its rectangle (x0, y0, x1, y1). calls: (function, word) in order.
+    """
+
+    def __init__(self, owner: Any, *, open_all: bool = False) -> None:
+        self._owner, self._imgui, self._open_all = owner, owner._imgui, open_all
+        self.calls: list[tuple[str, str]] = []
+        self.places: dict[str, tuple[float, float, float, float]] = {}
+
+    def __enter__(self) -> Spy:
+        self._owner._imgui = self
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._owner._imgui = self._imgui
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._imgui, name)
+
+        def call(*words: Any, **more: Any) -> Any:
+            if self._open_all and name == "collapsing_header":
+                self._imgui.set_next_item_open(True)
+            result = found(*words, **more)
+            if words and isinstance(words[0], str):
+                self.calls.append((name, words[0]))
+                low, high = self._imgui.get_item_rect_min(), self._imgui.get_item_rect_max()
+                self.places[words[0]] = low.x, low.y, high.x, high.y
+            return result
+
+        return call if callable(found) and name.islower() else found
+
+
+def middle(viewer: Viewer, owner: Any, label: str) -> tuple[int, int]:
+    """A point of the widget of `owner` whose label begins so: well inside, at half its height."""
+    with Spy(owner) as spy:
+        viewer.frame()
+    x0, y0, _, y1 = next(place for name, place in spy.places.items() if name.startswith(label))
+    return round(x0 + 100), round((y0 + y1) / 2)

@@ -84,7 +84,8 @@ class Viewer:
         """Until the window is closed, or for `frames` frames; the last one goes to `screenshot`, too."""
         busy = True
         while not self.window.closing and (frames is None or self.frames < frames):
-            busy = self.frame(0.0 if busy or frames is not None else IDLE) or self.panel.busy
+            changed = self.frame(0.0 if busy or frames is not None else IDLE)
+            busy = (changed or self.panel.busy) and not self.window.minimised
             if screenshot and self.frames == frames:
                 Image(None, self.screenshot()).save(screenshot)
             with self.window:

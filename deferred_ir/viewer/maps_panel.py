@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
+from ..dropping import shining
 from ..gl.resources import GpuTexture
+from ..graph import Step, Texture
 from .canvas import Area, Canvas
 from .controls import Controls
+from .frames import records
 from .session import Session
 
 SHARE = 0.33
 """Of the picture's shorter side."""
+
+
+@dataclass(frozen=True)
+class Map:
+    """Where a light's map is: `texture`, a layer of it and a part of that, None for all."""
+
+    light: str
+    state: str
+    texture: GpuTexture
+    layer: int = 0
+    part: Area | None = None
 
 
 class MapsPanel:
@@ -21,27 +35,53 @@ class MapsPanel:
         self._imgui, self._session, self._controls = imgui, session, controls
         self.light, self.intensity, self.linear = 0, 1.0, True
 
-    def _tiles(self) -> tuple[tuple[str, str], list[Mapping[str, Any]]] | None:
-        """The output that holds the maps, and the sub-pass of each light: those that name layer, tile and size."""
+    def _maps(self) -> list[Map]:
+        """Of the last frame: tiles of an atlas, or textures of their own, whichever pass draws them."""
         for step in self._session.plan.steps:
-            tiles = list(step.work.subpasses(step.descriptions))
-            if tiles and {"light", "layer", "tile", "size"} <= tiles[0].keys():
-                return (step.name, next(iter(step.outputs))), tiles
-        return None
+            found = self._tiles(step) or self._textures(step)
+            if found:
+                return found
+        return []
+
+    def _tiles(self, step: Step) -> list[Map]:
+        """From the sub-passes that name layer, tile and size."""
+        ports = {port: self._session.output((step.name, port)) for port in step.outputs}
+        if not all(isinstance(found, GpuTexture) and found.kept for found in ports.values()):
+            return []
+        texture, found = next(iter(ports.values())), []
+        for part in step.work.subpasses(step.descriptions, ports):
+            if {"light", "layer", "tile", "size"} <= part.keys():
+                y, x = divmod(part["tile"], texture.size[0] // part["size"])
+                place = Area(x * part["size"], y * part["size"], part["size"], part["size"])
+                found.append(Map(part["light"], part["state"], texture, part["layer"], place))
+        return found
+
+    def _textures(self, step: Step) -> list[Map]:
+        """From outputs that are lists of depth textures: the spotlight's, then one for each tile."""
+        textures: list[GpuTexture] = []
+        for port, output in step.outputs.items():
+            found = self._session.output((step.name, port))
+            if isinstance(output.description, Texture) and isinstance(found, list) and found[0].format.depth:
+                textures += found
+        lights = records(self._session)
+        if not textures or lights is None:
+            return []
+        tiles = sorted(lights["tile"][shining(lights)].astype(int).tolist())
+        return [Map(f"vpl {tile}" if tile >= 0 else "spotlight", "", textures[tile + 1]) for tile in tiles]
 
     def draw(self) -> None:
         """The switch and its sliders."""
         imgui, switches = self._imgui, self._controls.switches
-        found = self._tiles()
-        if not found:
-            imgui.text_disabled("this graph draws no atlas of maps")
+        maps = self._maps()
+        if not maps:
+            imgui.text_disabled("this graph draws no shadow maps")
             return
         _, switches["map"] = imgui.checkbox("in the corner (M)", switches["map"])
-        most = len(found[1]) - 1
-        _, self.light = imgui.slider_int(
-            "light", min(self.light, most), 0, most, found[1][min(self.light, most)]["light"]
-        )
-        imgui.set_item_tooltip("0 is the spotlight, n the VPL of number n - 1")
+        most = len(maps) - 1
+        chosen = maps[min(self.light, most)]
+        told = f"{chosen.light}, {chosen.state}" if chosen.state else chosen.light
+        _, self.light = imgui.slider_int("light", min(self.light, most), 0, most, told)
+        imgui.set_item_tooltip("0 is the spotlight; then the VPLs that there are, by their tiles")
         _, self.intensity = imgui.slider_float(
             "intensity", self.intensity, 0.01, 100.0, "%.3g", imgui.SliderFlags_.logarithmic
         )
@@ -50,15 +90,11 @@ class MapsPanel:
 
     def show(self, canvas: Canvas, area: Area) -> None:
         """Draw the chosen map over the picture's corner."""
-        found = self._tiles() if self._controls.switches["map"] else None
-        texture = self._session.output(found[0]) if found else None
-        if not found or not isinstance(texture, GpuTexture):
+        maps = self._maps() if self._controls.switches["map"] else []
+        if not maps:
             return
-        tile = found[1][min(self.light, len(found[1]) - 1)]
-        row = texture.size[0] // tile["size"]
-        y, x = divmod(tile["tile"], row)
-        part = Area(x * tile["size"], y * tile["size"], tile["size"], tile["size"])
+        chosen = maps[min(self.light, len(maps) - 1)]
         edge = max(round(SHARE * min(area.width, area.height)), 1)
         corner = Area(area.x, area.y, edge, edge)
         gain = self.intensity * (1.0 if self.linear else 0.3)
-        canvas.show(texture, corner, layer=tile["layer"], part=part, gain=gain, linear=self.linear)
+        canvas.show(chosen.texture, corner, layer=chosen.layer, part=chosen.part, gain=gain, linear=self.linear)

@@ -95,6 +95,8 @@ class Panel:
         imgui.text(f"{session.scene.name}, {session.size[0]}x{session.size[1]}{lights}, {last}")
         if session.accumulation:
             imgui.text(f"mean of {session.accumulation.frames} frames{session.noise_text}")
+        if distance := self.truth.text:
+            imgui.text(distance)
         if self.saved:
             imgui.text_wrapped(self.saved)
         if session.error:

@@ -1,7 +1,11 @@
-"""Saves what is on screen: PNG, EXR, and a scene file that `deferred-ir render` renders to the same pixels."""
+"""Saves what is on screen: PNG, EXR, and a scene file that `deferred-ir render` renders to the same pixels.
+
+A graph that is no built-in one is written, too, whole and with the settings in it: its own file may change any time.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +13,24 @@ import numpy as np
 
 from .. import scene_file
 from ..camera import Camera
+from ..config import graph_names
 from ..errors import OutputError
+from ..graph import Graph
 from ..image import check_folder, write_whole
 from ..lights import Spotlight
 from ..motion import CameraMotion, LissajousMotion, ModelMotion, SpotlightMotion
+from ..params import specs
 from ..scene_file import ModelEntry
 from .session import Session
 
+GRAPH = "-graph.toml"
+"""What a saved graph file's name adds to NAME."""
+
 
 def save(session: Session, folder: Path) -> Path:
-    """Write NAME.png, NAME.exr and NAME.toml into `folder`, NAME the first free one; the scene file's path.
+    """Write NAME.png, NAME.exr, NAME.toml and perhaps NAME-graph.toml into `folder`; the scene file's path.
+
+    NAME is the scene's, with the first number that is free.
 
     Raises OutputError where they cannot be written.
     """
@@ -28,42 +40,44 @@ def save(session: Session, folder: Path) -> Path:
     image = session.settled()
     image.save(folder / f"{stem}.png")
     image.save(folder / f"{stem}.exr")
-    text = _text(session, stem)
-    write_whole(target, lambda part: _write(part, text))
+    if not _builtin(session.graph):
+        _write(folder / f"{stem}{GRAPH}", graph_table(session.renderer.graph()))
+    frames = session.accumulation.frames if session.accumulation else 1
+    averaged = f" --accumulate {frames}" if frames > 1 else ""
+    _write(target, table(session, stem), f"# deferred-ir render {stem}.toml -o {stem}.png{averaged}\n")
     return target
 
 
-def _write(part: Path, text: str) -> None:
-    part.write_text(text, encoding="utf-8")
+def _write(target: Path, tables: Mapping[str, Any], comment: str = "") -> None:
+    import tomli_w
+
+    text = comment + tomli_w.dumps(tables)
+
+    def write(part: Path) -> None:
+        part.write_text(text, encoding="utf-8")
+
+    write_whole(target, write)
 
 
 def _free(folder: Path, name: str) -> str:
     stems = (f"{name}-{number}" for number in range(1, 100000))
-    found = next((stem for stem in stems if not any(folder.glob(f"{stem}.*"))), None)
+    found = next((stem for stem in stems if not any(folder.glob(f"{stem}[.-]*"))), None)
     if found is None:
         raise OutputError(f"{folder}: holds too many pictures of {name}; move some away")
     return found
 
 
-def _text(session: Session, stem: str) -> str:
-    import tomli_w
-
-    frames = session.accumulation.frames if session.accumulation else 1
-    averaged = f" --accumulate {frames}" if frames > 1 else ""
-    return f"# deferred-ir render {stem}.toml -o {stem}.png{averaged}\n{tomli_w.dumps(table(session))}"
-
-
-def table(session: Session) -> dict[str, Any]:
-    """The scene file of what is on screen, as TOML's tables."""
+def table(session: Session, stem: str) -> dict[str, Any]:
+    """The scene file NAME.toml of what is on screen, as TOML's tables; stem: NAME."""
     scene, path = session.scene, session.scene.path
     entries = scene_file.read(path).models if path.suffix.lower() == ".toml" else (ModelEntry(path),)
     camera, light = session.kept_motions()
     render: dict[str, Any] = {
-        "graph": _graph(session.graph),
+        "graph": session.graph if _builtin(session.graph) else f"{stem}{GRAPH}",
         "size": list(session.size),
         "seed": session.seed,
     }
-    if session.settings:
+    if session.settings and _builtin(session.graph):
         render["set"] = dict(session.settings)
     return {
         "name": scene.name,
@@ -74,9 +88,22 @@ def table(session: Session) -> dict[str, Any]:
     }
 
 
-def _graph(graph: str) -> str:
-    """A name, or a file's whole path: one beside the scene file would be looked for there."""
-    return str(Path(graph).resolve()) if graph.endswith(".toml") else graph
+def _builtin(graph: str) -> bool:
+    return graph in graph_names()
+
+
+def graph_table(graph: Graph) -> dict[str, Any]:
+    """The file of a graph, as TOML's tables: all passes with their inputs, and the parameters that are not defaults."""
+    passes = {}
+    for node in graph.nodes.values():
+        kind, defaults = type(node.work).__module__.rpartition(".")[2], node.work.Params()
+        made: dict[str, Any] = {} if kind == node.name else {"type": kind}
+        values = {name: getattr(node.work.params, name) for name in specs(node.work.Params)}
+        made |= {name: value for name, value in values.items() if value != getattr(defaults, name)}
+        if node.inputs:
+            made["inputs"] = dict(node.inputs)
+        passes[node.name] = made
+    return {"outputs": dict(graph.outputs), "passes": passes}
 
 
 def _model(entry: ModelEntry, time: float) -> dict[str, Any]:

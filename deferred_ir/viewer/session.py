@@ -17,6 +17,7 @@ import numpy as np
 from ..accumulation import Accumulation, readers
 from ..camera import Camera
 from ..errors import Error, GraphError
+from ..exposure import automatic_stops
 from ..gl.devices import Loader
 from ..graph import Plan, Step
 from ..image import Image
@@ -278,9 +279,18 @@ class Session:
             self._draw()
         return self.image()
 
-    def toned(self, radiance: Any) -> np.ndarray:
-        """Display pixels of `radiance` (H, W, 3) by this graph, uint8 (H, W, 4), bottom row first."""
+    def exposure(self) -> float | None:
+        """Stops of the picture on screen where its exposure is automatic, else None."""
+        plan = self.plan
+        return automatic_stops(self.image().radiance) if exposed(plan, 0.0) is not plan else None
+
+    def toned(self, radiance: Any, stops: float | None) -> np.ndarray:
+        """Display pixels of `radiance` (H, W, 3) by this graph, uint8 (H, W, 4), bottom row first.
+
+        stops: in place of an automatic exposure, so that two images are shown alike.
+        """
         place, late = self.plan.outputs["radiance"], readers(self.plan, self.plan.outputs["radiance"])
+        plan = self.plan if stops is None else exposed(self.plan, stops)
         texture = self.output(place)
         pixels = np.ones((*radiance.shape[:2], 4), np.float32)
         pixels[..., :3] = radiance[::-1]
@@ -288,8 +298,8 @@ class Session:
             before = texture.read()
             try:
                 texture.upload(pixels)
-                self.renderer.draw(self.shown, self.plan, seed=self.seed, steps=late)
-                display: np.ndarray = self.output(self.plan.outputs["display"]).read()
+                self.renderer.draw(self.shown, plan, seed=self.seed, steps=late)
+                display: np.ndarray = self.output(plan.outputs["display"]).read()
             finally:
                 texture.upload(before)
                 self.renderer.draw(self.shown, self.plan, seed=self.seed, steps=late)
@@ -344,3 +354,16 @@ def changed(old: Plan, new: Plan) -> set[str]:
 
 def _identity(step: Step) -> tuple[Any, ...]:
     return type(step.work), step.work.params, dict(step.sources), dict(step.outputs), dict(step.descriptions)
+
+
+def exposed(plan: Plan, stops: float) -> Plan:
+    """`plan` with `stops` wherever a pass's exposure is automatic; itself where none is."""
+    steps = [
+        replace(step, work=type(step.work)(replace(step.work.params, exposure=stops))) if _automatic(step) else step
+        for step in plan.steps
+    ]
+    return replace(plan, steps=tuple(steps)) if any(map(_automatic, plan.steps)) else plan
+
+
+def _automatic(step: Step) -> bool:
+    return getattr(step.work.params, "exposure", None) == "auto"

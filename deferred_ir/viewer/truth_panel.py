@@ -14,14 +14,15 @@ SPP = (16, 64, 256, 1024)
 
 
 class TruthPanel:
-    """The reference at the right of the split, the picture at its left."""
+    """The reference at the right of the split, the picture at its left, both with the exposure of the picture."""
 
     def __init__(self, imgui: Any, session: Session) -> None:
         self._imgui, self._session = imgui, session
         self.truth = Truth()
         self._spp, self.split, self.at = 1, True, 0.5
         self._texture: GpuTexture | None = None
-        self._made: tuple[Any, Plan] | None = None
+        self._made: tuple[Any, Plan, float | None] | None = None
+        self._stops: tuple[int, float | None] = -1, None
         self._seen = -1
 
     @property
@@ -49,10 +50,16 @@ class TruthPanel:
         if truth.result and not self._fits:
             imgui.text_wrapped("the reference is of another view or light; trace it again")
         if self._fits:
-            found = self._distance()
-            imgui.text("nothing is lit" if found is None else f"relMSE {found:.3g} (trimmed)")
             _, self.split = imgui.checkbox("split view", self.split)
             _, self.at = imgui.slider_float("split", self.at, 0.0, 1.0, "%.2f")
+
+    @property
+    def text(self) -> str:
+        """How far the picture is from its reference, for the status line."""
+        if not self._fits:
+            return ""
+        found = self._distance()
+        return "nothing is lit" if found is None else f"relMSE {found:.3g} (trimmed) from the reference"
 
     def _distance(self) -> float | None:
         changed, self._seen = self._session.version != self._seen, self._session.version
@@ -67,9 +74,12 @@ class TruthPanel:
         if self._texture is None or self._texture.size != self._session.size:
             self.release()
             self._texture = GpuTexture(self._session.renderer.gpu, Texture("rgba8"), self._session.size)
-        if self._made != (result, plan):
-            self._texture.upload(self._session.toned(result.radiance))
-            self._made = result, plan
+        if self._stops[0] != self._session.version:
+            self._stops = self._session.version, self._session.exposure()
+        made = result, plan, self._stops[1]
+        if self._made != made:
+            self._texture.upload(self._session.toned(result.radiance, self._stops[1]))
+            self._made = made
         canvas.show(self._texture, area, split=round(self.at * area.width))
 
     def release(self) -> None:

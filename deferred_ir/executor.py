@@ -48,7 +48,8 @@ class Executor:
         self._resources: dict[Key, Resource] = {}
         self._framebuffers: list[Framebuffer] = []
         self._plan: Plan | None = None
-        self._size = (0, 0)
+        self._size, self._shares = (0, 0), False
+        self._tenants: dict[tuple[str, str], tuple[str, str]] = {}
         self._ios: list[Io] = []
         self._runs = Runs()
         self.kept: tuple[str, ...] = ()
@@ -61,8 +62,9 @@ class Executor:
 
         `kept` names those that did not run since they would have written what they wrote last, if frame.reuse.
         """
-        if plan is not self._plan or frame.size != self._size:
-            self._allocate(plan, frame.size)
+        shares = not (frame.reuse or frame.keep_all)
+        if plan is not self._plan or frame.size != self._size or shares != self._shares:
+            self._allocate(plan, frame.size, shares)
         self.counters.clear()
         kept: list[str] = []
         self._frame_block.write(frame.block())
@@ -95,17 +97,30 @@ class Executor:
         self.kept = tuple(kept)
 
     def resource(self, source: tuple[str, str]) -> Any:
-        """What (pass, port) wrote in the last frame."""
-        found = next((r for key, r in self._resources.items() if key[:2] == source), None)
+        """What (pass, port) wrote in the last frame; KeyError where another pass has written into it since."""
+        home = self._tenants.get(source, source)
+        found = next((r for key, r in self._resources.items() if key[:2] == home), None)
         if found is None:
             raise KeyError(f"{source[0]}.{source[1]} is not in the plan")
+        if source != self._last_tenant(home):
+            raise KeyError(
+                f"{source[0]}.{source[1]}: another pass has its texture by now; make it an output of the graph"
+            )
         return found
 
+    def _last_tenant(self, home: tuple[str, str]) -> tuple[str, str]:
+        """Whose the texture of `home` is at the end of a frame."""
+        return next((source for source, of in reversed(self._tenants.items()) if of == home), home)
+
     def ports(self, step: Step) -> dict[str, Any]:
-        """Resources that a step of the plan reads and writes, by port."""
+        """Resources that a step of the plan reads and writes, by port; those that others have by now are left out."""
         sources = {port: source for port, source in step.sources.items() if source}
         sources |= {port: (step.name, port) for port in step.outputs}
-        return {port: self.resource(source) for port, source in sources.items()}
+        found = {}
+        for port, source in sources.items():
+            if self._last_tenant(self._tenants.get(source, source)) == source:
+                found[port] = self.resource(source)
+        return found
 
     def forget(self) -> None:
         """Drop what passes keep from frame to frame; the next frame runs all of them."""
@@ -131,13 +146,18 @@ class Executor:
     def _all(self) -> list[GpuTexture | GpuBuffer]:
         return [single for r in self._resources.values() for single in (r if isinstance(r, list) else [r])]
 
-    def _allocate(self, plan: Plan, size: tuple[int, int]) -> None:
-        """Make the plan's resources and framebuffers; what the last plan had and this one has stays."""
+    def _allocate(self, plan: Plan, size: tuple[int, int], shares: bool) -> None:
+        """Make the plan's resources and framebuffers; what the last plan had and this one has stays.
+
+        shares: transient outputs have textures in common.
+        """
         self._plan = None  # if an allocation fails, the next frame starts over
+        self._tenants = plan.tenants() if shares else {}
         keys = {
             (step.name, port, output.description, _size(output.description, size), type(step.work))
             for step in plan.steps
             for port, output in step.outputs.items()
+            if (step.name, port) not in self._tenants
         }
         for framebuffer in self._framebuffers:
             framebuffer.release()
@@ -150,6 +170,7 @@ class Executor:
             except DeviceError as error:
                 raise DeviceError(f"{key[0]}.{key[1]}: {error}") from error
         ports = {key[:2]: resource for key, resource in self._resources.items()}
+        ports |= {source: ports[home] for source, home in self._tenants.items()}
         written = {(s.name, port): output.defines for s in plan.steps for port, output in s.outputs.items()}
         for step in plan.steps:
             inputs = {port: ports[source] if source else None for port, source in step.sources.items()}
@@ -162,7 +183,7 @@ class Executor:
                 self._framebuffers.append(Framebuffer(self.gpu, targets, step.name))
                 io.attach(self._framebuffers[-1])
             self._ios.append(io)
-        self._plan, self._size = plan, size
+        self._plan, self._size, self._shares = plan, size, shares
 
     def _make(self, description: Description, size: tuple[int, int]) -> Resource:
         if isinstance(description, Buffer):

@@ -21,19 +21,22 @@ from .params import NoParams
 class Texture:
     """A texture: `size` (width, height), None for the frame's; `layers` > 0 makes it an array.
 
-    `copies` > 0 makes that many separate textures, which the pass itself attaches and binds one by one. `mend` says
-    what to use where a driver takes none as large.
+    `copies` > 0 makes that many separate textures, which the pass itself attaches and binds one by one. `grows`: it
+    begins with one layer, and its pass asks for as many as a frame needs, `layers` at most. `mend` says what to use
+    where a driver takes none as large.
     """
 
     format: str
     size: tuple[int, int] | None = None
     layers: int = 0
     copies: int = 0
+    grows: bool = False
     mend: str = field(default="a smaller size", compare=False)
 
     def __str__(self) -> str:
         size = "frame" if self.size is None else f"{self.size[0]}x{self.size[1]}"
-        many = f" x {self.layers} layers" if self.layers else f", {self.copies} of them" if self.copies else ""
+        most = "up to " if self.grows else ""
+        many = f" x {most}{self.layers} layers" if self.layers else f", {self.copies} of them" if self.copies else ""
         return f"{self.format} {size}{many}"
 
 
@@ -80,6 +83,8 @@ class Output:
 
     `attach` False: a texture that shaders store into wherever they like, instead of a target of the pass's framebuffer.
     `spare`: the pass can do without it, and does where nothing reads it; its shader asks for `TARGET_<PORT>`.
+    `transient`: a texture that each frame writes whole and the next does not read, so that once its last reader is done
+    another output of the same description may use it.
     """
 
     doc: str
@@ -87,6 +92,7 @@ class Output:
     defines: Mapping[str, int | float] = field(default_factory=dict)
     attach: bool = True
     spare: bool = False
+    transient: bool = False
 
 
 NO_PORTS: Mapping[str, Any] = {}
@@ -213,3 +219,18 @@ class Plan:
     outputs: Mapping[str, tuple[str, str]]
     left_out: Mapping[str, str]
     lifetimes: Mapping[tuple[str, str], tuple[int, int]]
+
+    def tenants(self) -> dict[tuple[str, str], tuple[str, str]]:
+        """Transient outputs that can use the texture of one whose last reader is done by then: whose."""
+        found: dict[tuple[str, str], tuple[str, str]] = {}
+        free: list[tuple[str, str]] = []
+        described = {(s.name, port): output for s in self.steps for port, output in s.outputs.items()}
+        transient = {source: output.description for source, output in described.items() if output.transient}
+        for number, step in enumerate(self.steps):
+            for source in [(step.name, port) for port in step.outputs if (step.name, port) in transient]:
+                home = next((other for other in free if transient[other] == transient[source]), None)
+                if home:
+                    free.remove(home)
+                    found[source] = home
+            free += [found.get(source, source) for source in transient if self.lifetimes[source][1] == number]
+        return found

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from .errors import ShaderError
+from .errors import DeviceError, ShaderError
 from .frame import Frame
 from .gl.resources import Framebuffer, GpuBuffer, GpuTexture
 from .gl.shaders import Program, ShaderLibrary
@@ -91,6 +91,16 @@ class Io:
                 raise ShaderError(f"{program.name}: sampler '{min(unknown)}' is no input of pass {self._step.name}")
             self._programs[key] = program
         return self._programs[key]
+
+    def fit(self, port: str, layers: int) -> None:
+        """Let the texture `port`, one that grows and is drawn into, have room for `layers` layers."""
+        try:
+            anew = self[port].fit(layers)
+        except DeviceError as error:
+            self.framebuffer.attach()
+            raise DeviceError(f"{self._step.name}.{port}: {error}") from error
+        if anew:
+            self.framebuffer.attach()
 
     def count(self, name: str, value: int) -> None:
         """Publish how much work this run did, such as the number of maps drawn; none where the pass is not run."""

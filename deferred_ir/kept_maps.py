@@ -32,19 +32,27 @@ class KeptMaps:
     held: Ints
 
     @classmethod
-    def of(cls, io: Io, params: MapParams) -> KeptMaps:
-        """For the frame at hand: clears the places of lights that must be drawn, or the whole atlas."""
+    def of(cls, io: Io, params: MapParams, *, all_tiles: bool) -> KeptMaps:
+        """For the frame at hand: clears the places of lights that must be drawn, or the whole atlas.
+
+        all_tiles: there is room for all lights that there may ever be; else, unless maps are kept, for those there are.
+        """
         atlas, lights = io["atlas"], io["lights"]
         places = lights.records["tile"].astype(int) + 1
         versions, lit = lights.versions, shining(lights.records)
+        per_layer = (atlas.size[0] // params.vpl_size) ** 2
+        layers = atlas.description.layers
+        if versions is None and not all_tiles:
+            layers = 1 - (-int(places[lit].max(initial=0)) // per_layer)
+        io.fit("atlas", layers)
         before: KeptMaps | None = atlas.kept
         if versions is not None and before and before.versions is not None and before.params == params:
             kept = cls(params, places, versions, lit, lit & (before.held[places] != versions), before.held)
             kept.clear(atlas)
         else:
             io.framebuffer.clear_depth()
-            tiles = (atlas.description.layers - 1) * (atlas.size[0] // params.vpl_size) ** 2
-            kept = cls(params, places, versions, lit, lit, np.zeros(1 + tiles, np.int64))
+            held = np.zeros(1 + (atlas.description.layers - 1) * per_layer, np.int64)
+            kept = cls(params, places, versions, lit, lit, held)
         atlas.kept = kept
         return kept
 

@@ -62,7 +62,7 @@ class Gather(Pass):
         """Irradiance of the frame's size, and the pixels that the window is not enough for."""
         del inputs
         return {
-            "irradiance": Output("irradiance from the VPLs", Texture("rgba32f")),
+            "irradiance": Output("irradiance from the VPLs", Texture("rgba32f"), transient=True),
             "thin": Output("pixels that ask VPLs themselves, row by row", Texture("r32ui"), attach=False),
             "missing": Output("of which shares, 64 bits a pixel", Texture("rg32ui"), attach=False),
             "count": Output("how many", Texture("r32ui", (1, 1)), attach=False),

@@ -32,7 +32,7 @@ class Interleaved(Pass):
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Irradiance before albedo, which the filter must not blur."""
         del inputs
-        return {"shares": Output("irradiance in sub-buffers; 0 on the background", Texture("rgba32f"))}
+        return {"shares": Output("irradiance in sub-buffers; 0 on the background", Texture("rgba32f"), transient=True)}
 
     def depends(self) -> frozenset[str]:
         """Positions come back from the depth."""

@@ -36,7 +36,11 @@ class Lighting(Pass):
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Radiance in 32 bits: 256 terms drown in a half float."""
         del inputs
-        return {"radiance": Output("reflected radiance, linear RGB; 0 on the background", Texture("rgba32f"))}
+        return {
+            "radiance": Output(
+                "reflected radiance, linear RGB; 0 on the background", Texture("rgba32f"), transient=True
+            )
+        }
 
     def depends(self) -> frozenset[str]:
         """Positions come back from the depth."""

@@ -43,7 +43,7 @@ class NearField(Pass):
         """One texture of the frame's size."""
         del inputs
         doc = "irradiance lost to the clamp; alpha: the pixel's weight, 0 where no ray was traced"
-        return {"residual": Output(doc, Texture("rgba32f"))}
+        return {"residual": Output(doc, Texture("rgba32f"), transient=True)}
 
     def unneeded(self, facts: Facts) -> str | None:
         """Without a clamp there is no residual, and without light none either."""

@@ -48,7 +48,9 @@ class ShadowMaps(Pass):
         self.params.check_layers(vpls, layers, per_layer)
         defines = {**self.params.defines(), "ATLAS_SIZE": edge}
         larger = "spot_size" if edge == self.params.spot_size else "vpl_size"
-        atlas = Texture("depth32f", size=(edge, edge), layers=layers, mend=f"a smaller shadow_maps.{larger}")
+        atlas = Texture(
+            "depth32f", size=(edge, edge), layers=layers, grows=True, mend=f"a smaller shadow_maps.{larger}"
+        )
         return {"atlas": Output("reversed depth; layer 0 the spotlight's, then tiles of VPLs", atlas, defines)}
 
     def unneeded(self, facts: Facts) -> str | None:
@@ -76,7 +78,7 @@ class ShadowMaps(Pass):
     def execute(self, frame: Frame, io: Io) -> None:
         """Clear, then draw for each light what it may see, unless its map is there already."""
         gpu, lights = io.gpu, io["lights"]
-        kept = KeptMaps.of(io, self.params)
+        kept = KeptMaps.of(io, self.params, all_tiles=frame.keep_all)
         self.params.prepare(gpu)
         geometry = [] if gpu.layer_from_vertex else ["shadow_maps.geom"]
         program = io.program("depth.frag", "shadow_maps.vert", *geometry)

@@ -40,7 +40,11 @@ class ThinRays(Pass):
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """A texture of the frame's size."""
         del inputs
-        return {"irradiance": Output("irradiance at these pixels; 0 at all others", Texture("rgba32f"), attach=False)}
+        return {
+            "irradiance": Output(
+                "irradiance at these pixels; 0 at all others", Texture("rgba32f"), attach=False, transient=True
+            )
+        }
 
     def depends(self) -> frozenset[str]:
         """Rays from what the camera sees; the lights come as an input."""

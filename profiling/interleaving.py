@@ -98,7 +98,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def pictures(scene: Scene, path: Path, n: int = 4) -> None:
     """A corner of the image: shares in their sub-buffers, put together, filtered, and by all VPLs."""
-    with Renderer(SIZE, "interleaved", set={"interleave.n": n}) as one:
+    with Renderer(SIZE, "interleaved", set={"interleave.n": n}, keep_all=True) as one:
         shared = one.render(scene, vpls=256).radiance
         shares = _read(one, "interleaved", "shares")[..., :3]
         albedo = _read(one, "gbuffer", "albedo")[::-1, :, :3]

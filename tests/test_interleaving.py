@@ -75,7 +75,8 @@ def test_other_blocks_are_refused(renderer, n):
 @pytest.mark.parametrize("size", [(61, 47), (32, 32), (7, 3), (1, 1)])
 def test_the_filter_is_what_it_says(renderer, n, size):
     scene = crooked_room()
-    _, _, one = images(renderer, scene, 70, size, interleave__n=n)
+    one = renderer(size, "interleaved", set={"interleave.n": n}, keep_all=True)
+    one.render(scene, vpls=70, seed=1)
     irradiance = written(one, "gather.irradiance")[..., :3]
     depth, normals = written(one, "gbuffer.depth")[..., 0], written(one, "gbuffer.normals")
     shares = written(one, "interleaved.shares")[..., :3]

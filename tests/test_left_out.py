@@ -10,6 +10,7 @@ import pytest
 from small_scenes import build, quad, room
 
 from deferred_ir.camera import Camera
+from deferred_ir.gl.resources import GpuTexture
 from deferred_ir.graph import Input, Output, Texture
 from deferred_ir.io import FullscreenPass
 from deferred_ir.lights import Spotlight
@@ -154,3 +155,55 @@ def test_a_target_that_nothing_reads_is_not_written(renderer, tmp_path):
     assert plan.left_out["gbuffer.albedo"] == "nothing reads it"
     assert few < more - 2 * 8 * SIZE[0] * SIZE[1]
     assert "gbuffer.albedo" not in kept.left_out
+
+
+def atlas(one):
+    return one.executor.resource(("shadow_maps", "atlas"))
+
+
+def test_the_atlas_has_room_for_the_lights_that_live(renderer, monkeypatch):
+    made = []
+    allocate = GpuTexture._allocate
+    monkeypatch.setattr(GpuTexture, "_allocate", lambda self, layers: (made.append(layers), allocate(self, layers)))
+    settings = {"shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 16}
+    half = replace(gable(), spotlight=replace(gable().spotlight, position=(0.1, 1.6, 1.0), look_at=(0.1, -1.0, 1.0)))
+    one = renderer(SIZE, set=settings)
+    image = one.render(half, vpls=256)
+    lights = one.executor.resource(("vpl", "lights")).records
+    tiles = lights["tile"][lights["emission"].any(axis=1)].max() + 1
+    assert 16 < tiles < 200
+    assert atlas(one).layers == 1 + -(-tiles // 16) < 17
+    full = renderer(SIZE, set=settings, keep_all=True)
+    assert same(image, full.render(half, vpls=256))
+    assert atlas(full).layers == 17
+    made.clear()
+    for seed in range(1, 7):
+        one.render(half, vpls=256, seed=seed)
+    assert len(made) <= 2
+    one.render(room(), vpls=256)
+    assert atlas(one).layers == 17
+
+
+def test_transient_targets_share_textures_and_the_pixels_are_the_same(renderer):
+    for graph in ("interleaved", "accurate"):
+        settings = {"shadow_rays.visibility": "rays"} if graph == "accurate" else {}
+        one, full = (renderer(SIZE, graph, set=settings, keep_all=keep_all) for keep_all in (False, True))
+        images = [r.render(room(), vpls=16, seed=seed) for r in (one, full) for seed in (0, 1)]
+        assert same(images[0], images[2])
+        assert same(images[1], images[3])
+        plan = one.plan(room(), 16)
+        assert len(plan.tenants()) == 1
+        spared = full.executor.memory()["textures"] - one.executor.memory()["textures"]
+        assert spared == 16 * SIZE[0] * SIZE[1]
+        source = next(iter(plan.tenants().values()))
+        with pytest.raises(KeyError, match="another pass has its texture by now; make it an output"):
+            one.executor.resource(source)
+        assert one.render(room(), vpls=16, accumulate=2).radiance.tobytes() == (
+            full.render(room(), vpls=16, accumulate=2).radiance.tobytes()
+        )
+
+
+def test_no_texture_is_shared_where_frames_are_reused(renderer):
+    one = renderer(SIZE, "interleaved", reuse=True)
+    one.render(room(), vpls=16)
+    assert one.executor.resource(("interleaved", "shares")) is not one.executor.resource(("lighting", "radiance"))

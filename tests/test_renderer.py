@@ -100,7 +100,7 @@ def test_programs_are_built_once(renderer):
     built = one.executor.library.compiled
     one.render(room(), vpls=4, seed=1)
     one.render(room(), vpls=9)
-    one.render(build(plane()), vpls=9)
+    one.render(build(plane(), plane(height=-1)), vpls=9)
     assert one.executor.library.compiled == built
 
 

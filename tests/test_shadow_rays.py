@@ -23,7 +23,7 @@ RAYS = {"shadow_rays.visibility": "rays", "vpl.clamp": 0.02, "vpl.candidates": 1
 
 def drawn(renderer, scene, vpls, **settings):
     """A Renderer that has drawn one frame of `accurate` by rays, and its plan."""
-    one = renderer(SIZE, "accurate", set=RAYS | settings)
+    one = renderer(SIZE, "accurate", set=RAYS | settings, keep_all=True)
     plan = one.plan(scene, vpls)
     one.draw(scene, plan)
     return one, plan

@@ -52,7 +52,7 @@ SCRATCH_UNIT = 31
 
 
 class GpuTexture:
-    """An immutable 2D texture or array of one level. `size` is (width, height).
+    """A 2D texture or array of one level. `size` is (width, height), `layers` how many an array has now, else 0.
 
     kept: what its writer notes about what it holds, for the frames that follow. version: another number whenever
     something was written into it, unlike that of any other texture or buffer.
@@ -63,21 +63,45 @@ class GpuTexture:
     def __init__(self, gpu: Gpu, description: Texture, size: tuple[int, int]) -> None:
         self.gpu, self.description, self.size = gpu, description, size
         self.format = FORMATS[description.format]
-        self.nbytes = size[0] * size[1] * max(description.layers, 1) * self.format.bytes
         self.target = raw.TEXTURE_2D_ARRAY if description.layers else raw.TEXTURE_2D
+        self._allocate(min(description.layers, 1) if description.grows else description.layers)
+
+    def _allocate(self, layers: int) -> None:
+        """Have OpenGL make it."""
+        gl, self.layers = self.gpu.gl, layers
         self.touch()
-        gl = gpu.gl
         self.glo = gl.make("GenTextures")
         self._bind_to_work()
-        if description.layers:
-            gl.TexStorage3D(self.target, 1, self.format.internal, *size, description.layers)
+        if layers:
+            gl.TexStorage3D(self.target, 1, self.format.internal, *self.size, layers)
         else:
-            gl.TexStorage2D(self.target, 1, self.format.internal, *size)
+            gl.TexStorage2D(self.target, 1, self.format.internal, *self.size)
         try:
-            gl.check(f"texture {description} of {self.nbytes / 2**20:.0f} MiB")
+            gl.check(f"texture {self.description} of {self.nbytes / 2**20:.0f} MiB")
         except DeviceError:
             self.release()
             raise
+
+    @property
+    def nbytes(self) -> int:
+        """Its size."""
+        return self.size[0] * self.size[1] * max(self.layers, 1) * self.format.bytes
+
+    def fit(self, layers: int) -> bool:
+        """Have `layers` layers, or up to twice as many if it has them; whether it was made anew for that.
+
+        Then it holds nothing, and is to be attached again (`Framebuffer.attach`).
+        """
+        if layers <= self.layers <= 2 * layers:
+            return False
+        self.kept = None
+        self.gpu.gl.delete("DeleteTextures", self.glo)
+        try:
+            self._allocate(layers)
+        except DeviceError:
+            self._allocate(1)
+            raise
+        return True
 
     def touch(self) -> None:
         """Note that something else was written into it."""
@@ -91,7 +115,7 @@ class GpuTexture:
         gl.PixelStorei(0x0CF5, 1)  # UNPACK_ALIGNMENT
         source = self.format.layout, self.format.type, data.ctypes.data_as(ctypes.c_void_p)
         if self.description.layers:
-            gl.TexSubImage3D(self.target, 0, 0, 0, 0, *self.size, self.description.layers, *source)
+            gl.TexSubImage3D(self.target, 0, 0, 0, 0, *self.size, self.layers, *source)
         else:
             gl.TexSubImage2D(self.target, 0, 0, 0, *self.size, *source)
 
@@ -112,7 +136,7 @@ class GpuTexture:
 
     def read(self) -> np.ndarray:
         """All texels, (H, W, channels) or (layers, H, W, channels), bottom row first."""
-        layers = (self.description.layers,) if self.description.layers else ()
+        layers = (self.layers,) if self.layers else ()
         pixels = np.empty((*layers, self.size[1], self.size[0], self.format.channels), self.format.dtype)
         gl = self.gpu.gl
         self._bind_to_work()
@@ -151,10 +175,15 @@ class Framebuffer:
     """The textures a pass draws into: colours in the order given, at most one depth. Arrays are attached whole."""
 
     def __init__(self, gpu: Gpu, textures: Mapping[str, GpuTexture], name: str) -> None:
-        self.gpu, gl = gpu, gpu.gl
+        self.gpu, self._textures, self._name = gpu, textures, name
         self.size = next(iter(textures.values())).size
-        self.glo = gl.make("GenFramebuffers")
+        self.glo = gpu.gl.make("GenFramebuffers")
         self.colors = [texture for texture in textures.values() if not texture.format.depth]
+        self.attach()
+
+    def attach(self) -> None:
+        """Attach its textures as they are now, and bind it."""
+        gl, textures = self.gpu.gl, self._textures
         gl.BindFramebuffer(raw.FRAMEBUFFER, self.glo)
         for i, color in enumerate(self.colors):
             gl.FramebufferTexture(raw.FRAMEBUFFER, raw.COLOR_ATTACHMENT0 + i, color.glo, 0)
@@ -165,8 +194,8 @@ class Framebuffer:
         gl.DrawBuffers(len(targets), (ctypes.c_uint * len(targets))(*targets))
         status = gl.CheckFramebufferStatus(raw.FRAMEBUFFER)
         if status != raw.FRAMEBUFFER_COMPLETE:
-            gl.check(f"framebuffer of {name}")
-            raise ValueError(f"{name}: framebuffer incomplete (0x{status:04x}): outputs differ in size or layers")
+            gl.check(f"framebuffer of {self._name}")
+            raise ValueError(f"{self._name}: framebuffer incomplete (0x{status:04x}): outputs differ in size or layers")
 
     def bind(self) -> None:
         """Draw into it from now on, over its whole size."""

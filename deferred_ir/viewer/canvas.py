@@ -57,7 +57,7 @@ class Canvas:
         self._gpu.reset()
         self._window.viewport(area.x, area.y, area.width, area.height)
         texture.bind(0, self._gpu.sampler(linear=False))
-        defines = {"KIND": kind, "LAYERS": int(texture.description.layers > 0), "NEAR_FRACTION": NEAR}
+        defines = {"KIND": kind, "LAYERS": int(texture.layers > 0), "NEAR_FRACTION": NEAR}
         program = self._library.program("show.frag", defines=defines, folder=FOLDER)
         program.set(corner=(area.x, area.y), target=(area.width, area.height), split=split)
         program.set(source=(part.x, part.y), extent=(part.width, part.height), layer=layer)

@@ -44,8 +44,8 @@ class PassesPanel:
                 "brightness", self._gain, 0.01, 100.0, "%.3g", imgui.SliderFlags_.logarithmic
             )
             texture = _texture(session.output(self.pinned))
-            if texture and texture.description.layers > 1:
-                most = texture.description.layers - 1
+            if texture and texture.layers > 1:
+                most = texture.layers - 1
                 _, self._layer = imgui.slider_int("layer", min(self._layer, most), 0, most)
             if imgui.button("back to the picture"):
                 self.pinned = None
@@ -102,7 +102,7 @@ class PassesPanel:
         """Draw what is to be looked at over the picture."""
         texture = _texture(self._session.output(self.shown)) if self.shown else None
         if texture:
-            layer = min(self._layer, max(texture.description.layers - 1, 0))
+            layer = min(self._layer, max(texture.layers - 1, 0))
             canvas.show(texture, area.fitted(texture.size), gain=self._gain, layer=layer)
 
 

@@ -50,7 +50,8 @@ def render(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
     ) as renderer:
         print(f"OpenGL on {renderer.gpu.device}", file=sys.stderr)
         graph = renderer.graph()
-        plan = renderer.plan(scene, outputs=_wanted(outputs, graph.outputs, averaged=arguments.accumulate > 1))
+        wanted = _wanted(outputs, graph.outputs, averaged=arguments.accumulate > 1)
+        plan = renderer.plan(scene, outputs=None if arguments.keep_all else wanted)
         record = Record() if json else None
         if record:
             renderer.draw(scene, plan, seed=seed)  # compiles, allocates: not what a frame costs

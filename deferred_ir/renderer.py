@@ -120,7 +120,7 @@ class Renderer:
             software=self.gpu.device.kind == "software",
             keep_all=self._keep_all,
         )
-        wanted = tuple(graph.outputs if outputs is None or self._keep_all else outputs)
+        wanted = tuple(graph.outputs if outputs is None else outputs)
         key = (vpls, known, wanted)
         if key not in self._plans:
             plan = compile(graph, wanted, known)

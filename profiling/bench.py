@@ -66,7 +66,8 @@ def take_turns(
     records = {graph: Record() for graph in graphs}
     with ExitStack() as stack:
         renderers = {
-            graph: stack.enter_context(Renderer(size, GRAPHS[graph], device, passes=LIMITS)) for graph in graphs
+            graph: stack.enter_context(Renderer(size, GRAPHS[graph], device, passes=LIMITS, keep_all=True))
+            for graph in graphs
         }
         plans = {
             graph: renderer.plan(scene, vpls, [name for name in renderer.graph().outputs if name != "display"])

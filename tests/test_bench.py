@@ -25,7 +25,7 @@ OPTIONS = {"vpls": 4, "size": (64, 64), "turns": 2, "device": "software"}
 
 
 def drawn(renderer, graph, vpls, source, outputs, **options):
-    one = renderer((64, 64), bench.GRAPHS[graph], passes=LIMITS, **options)
+    one = renderer((64, 64), bench.GRAPHS[graph], passes=LIMITS, keep_all=True, **options)
     plan = one.plan(load("cornell"), vpls, outputs)
     one.draw(load("cornell"), plan)
     with one.gpu.ctx:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import ClassVar
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from small_scenes import build, quad, room
 
+from deferred_ir import cli
 from deferred_ir.camera import Camera
 from deferred_ir.gl.resources import GpuTexture
 from deferred_ir.graph import Input, Output, Texture
@@ -207,3 +209,16 @@ def test_no_texture_is_shared_where_frames_are_reused(renderer):
     one = renderer(SIZE, "interleaved", reuse=True)
     one.render(room(), vpls=16)
     assert one.executor.resource(("interleaved", "shares")) is not one.executor.resource(("lighting", "radiance"))
+
+
+def test_the_command_line_can_keep_all(tmp_path):
+    images = []
+    for options in ([], ["--keep-all"]):
+        path, run = tmp_path / f"{len(options)}.npy", tmp_path / f"{len(options)}.json"
+        command = ["render", "cornell", "--size", "24x16", "--vpls", "4", "--device", "software"]
+        assert cli.main([*command, "-o", str(path), "--json", str(run), *options]) == 0
+        made = json.loads(run.read_text())
+        images.append((np.load(path), [entry["name"] for entry in made["passes"]], made["memory_bytes"]["textures"]))
+    (slim, few, _), (full, more, _) = images
+    assert np.array_equal(slim, full)
+    assert [*few, "tonemap"] == more

@@ -94,38 +94,6 @@ def test_the_mouse_over_the_panel_leaves_the_camera_alone(viewer):
     assert viewer.session.camera == before
 
 
-def test_a_dropped_scene_is_loaded_and_a_broken_one_leaves_the_picture(viewer, tmp_path):
-    (tmp_path / "broken.toml").write_text("name = 3")
-    before = picture(viewer)
-    viewer.window.on_drop([str(tmp_path / "broken.toml")])
-    viewer.frame()
-    assert "broken.toml" in viewer.session.error
-    assert np.array_equal(picture(viewer), before)
-    viewer.window.on_drop([str(load("colors").path)])
-    viewer.frame()
-    assert viewer.session.scene.name == "colors"
-    assert viewer.session.error == ""
-
-
-def test_a_dropped_graph_is_used(viewer, tmp_path):
-    (tmp_path / "flat.toml").write_text('extends = "deferred"\n[passes.tonemap]\noperator = "none"\n')
-    viewer.window.on_drop([str(tmp_path / "flat.toml")])
-    viewer.frame()
-    assert viewer.session.error == ""
-    assert viewer.session.renderer.graph().nodes["tonemap"].work.params.operator == "none"
-
-
-@pytest.mark.parametrize("size", [(1, 1), (700, 200)])
-def test_the_picture_follows_the_window(viewer, size):
-    viewer.window.resize(size)
-    for _ in range(3):
-        viewer.frame(0.02)
-    assert viewer.window.size == size
-    area = viewer.area()
-    assert viewer.session.size == (area.width, area.height)
-    assert viewer.session.error == ""
-
-
 def test_tab_hides_the_panel_and_the_picture_takes_its_place(viewer):
     act(viewer, "key", "Tab")
     assert viewer.session.size == (SIZE[0] + WIDTH, SIZE[1])

@@ -11,7 +11,7 @@ from virtual_display import FEW, SIZE, Spy, act, frames, middle, picture, render
 
 from deferred_ir import cli
 from deferred_ir.exposure import automatic_stops
-from deferred_ir.lights import LIGHT, NEAR
+from deferred_ir.lights import LIGHT
 from deferred_ir.loading import load
 from deferred_ir.viewer import frames as local_frames
 from deferred_ir.viewer import panel as panels
@@ -116,23 +116,6 @@ def test_a_projected_point_is_where_the_ray_of_its_pixel_goes(viewer):
     points, front = local_frames.project(np.asarray(viewer.session.eye.position) + rays[7, 11][None], viewer.session)
     assert front.all()
     assert np.allclose(points, [[11.5, 7.5]])
-
-
-def test_the_shadow_map_stands_in_the_lower_left_corner(viewer):
-    before = picture(viewer)
-    act(viewer, "key", "m")
-    changed = (picture(viewer) != before).any(axis=-1)
-    assert changed[-20:, :20].any()
-    assert not changed[: SIZE[1] // 2].any()
-    atlas = viewer.session.renderer.executor.resource(("shadow_maps", "atlas"))
-    with viewer.window:
-        depth = atlas.read()[0, ..., 0]
-    edge = round(0.33 * SIZE[1])
-    texels = (np.arange(edge) * len(depth)) // edge
-    near = depth[np.ix_(texels, texels)]
-    expected = 255 * np.divide(NEAR, near, out=np.zeros_like(near), where=near > 0).clip(0, 1)
-    corner = picture(viewer)[::-1][:edge, :edge, 0]
-    assert np.abs(corner - expected).max() <= 1
 
 
 def test_the_output_of_a_pass_is_shown_while_pinned(viewer):

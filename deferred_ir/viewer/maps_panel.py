@@ -37,7 +37,7 @@ class MapsPanel:
 
     def _maps(self) -> list[Map]:
         """Of the last frame: tiles of an atlas, or textures of their own, whichever pass draws them."""
-        for step in self._session.plan.steps:
+        for step in self._session.drawn.steps if self._session.drawn else ():
             found = self._tiles(step) or self._textures(step)
             if found:
                 return found

@@ -40,6 +40,7 @@ class Session:
     """One scene in one Renderer, on the context of `window`.
 
     size: (width, height) of the picture. settings: {"pass.param": value}. error: what last went wrong, "" if nothing.
+    plan: what is to be drawn; drawn: what was, None where that failed.
     """
 
     def __init__(
@@ -66,7 +67,7 @@ class Session:
         self._path: Path | None = None
         self._undo: Callable[[], None] = lambda: None
         self._still = False
-        self._drawn: Plan | None = None
+        self.drawn: Plan | None = None
         self._use(scene)
         self.plan = self._planned()
 
@@ -201,12 +202,12 @@ class Session:
         except Error as error:
             self.error = str(error)
             self._undo()
-            self._undo, self._drawn, self.accumulation = lambda: None, None, None
+            self._undo, self.drawn, self.accumulation = lambda: None, None, None
             self._still = False
             return False
 
     def _draw(self) -> bool:
-        self.plan, before = self._planned(), self._drawn
+        self.plan, before = self._planned(), self.drawn
         if self._still and self.plan is before:
             return self._accumulate()
         if self.accumulation and self._still and before and self._only_late(before):
@@ -217,7 +218,7 @@ class Session:
             self.accumulation = None
             ran = self._frame()
         # What passes keep from frame to frame may take some to come to rest (graph `incremental`).
-        self._drawn, self._still, self._undo = self.plan, self.accumulation is not None or not ran, lambda: None
+        self.drawn, self._still, self._undo = self.plan, self.accumulation is not None or not ran, lambda: None
         return ran
 
     def _only_late(self, before: Plan) -> bool:

@@ -1,0 +1,259 @@
+"""The viewer's panel: passes, maps, words that fit, motions, and graphs that are saved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+from virtual_display import FEW, SIZE, Spy, act, frames, middle, picture, rendered, xdo
+
+from deferred_ir import cli
+from deferred_ir.config import graph_hash, load_graph
+from deferred_ir.dropping import shining
+from deferred_ir.lights import NEAR
+from deferred_ir.loading import load
+from deferred_ir.viewer import panel as panels
+from deferred_ir.viewer.frames import records
+from deferred_ir.viewer.panel import WIDTH
+
+TALL = 900
+"""Height of a window in which all of the panel's rows show."""
+
+
+@pytest.fixture
+def tall(viewer):
+    viewer.window.resize((SIZE[0] + WIDTH, TALL))
+    frames(viewer, 2)
+    return viewer
+
+
+def words(viewer, owner):
+    with Spy(owner) as spy:
+        viewer.frame()
+    return spy.calls
+
+
+def encoded(linear):
+    return 255 * np.clip(np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055), 0, 1)
+
+
+def test_hovering_an_output_shows_it_and_a_click_pins_it(tall):
+    viewer, passes = tall, tall.panel.passes
+    whole = picture(viewer)
+    with viewer.window:
+        albedo = encoded(viewer.session.output(("gbuffer", "albedo")).read()[::-1, ..., :3])
+    x, y = middle(viewer, passes, "  albedo")
+    act(viewer, "mousemove", "--sync", x, y, frames=2)
+    assert passes.shown == ("gbuffer", "albedo")
+    assert np.abs(picture(viewer) - albedo).max() <= 1
+    act(viewer, "mousemove", "--sync", 20, 20, frames=2)
+    assert np.array_equal(picture(viewer), whole)
+    act(viewer, "mousemove", "--sync", x, y, "click", 1)
+    act(viewer, "mousemove", "--sync", 20, 20, frames=2)
+    assert np.abs(picture(viewer) - albedo).max() <= 1
+    act(viewer, "mousemove", "--sync", x, y, "click", 1)
+    act(viewer, "mousemove", "--sync", 20, 20, frames=2)
+    assert passes.pinned is None
+    assert np.array_equal(picture(viewer), whole)
+
+
+def test_what_is_left_out_is_dim_with_its_reason_and_what_it_saves(viewer):
+    viewer.session.shine(replace(viewer.session.spotlight, emission=(0.0, 0.0, 0.0)))
+    viewer.frame()
+    told = [word for name, word in words(viewer, viewer.panel.passes) if name == "text_disabled"]
+    maps = next(word for word in told if word.startswith("shadow_maps"))
+    assert "no light needs one: the spotlight emits nothing; that saves about" in maps
+    assert maps.endswith(" ms")
+
+
+def test_passes_that_are_kept_are_told(viewer):
+    frames(viewer, 2)
+    viewer.session.look(replace(viewer.session.camera, fov=50.0))
+    viewer.frame()
+    told = [word for _, word in words(viewer, viewer.panel.passes)]
+    assert "shadow_maps: kept" in told
+    assert "gbuffer" in told
+    viewer.session.adjust("tonemap.exposure", 1.0)
+    viewer.frame()
+    assert {"gbuffer: kept", "lighting: kept", "tonemap"} <= {word for _, word in words(viewer, viewer.panel.passes)}
+
+
+@pytest.mark.parametrize(
+    ("graph", "settings"),
+    [
+        ("deferred", {}),
+        ("forward", {}),
+        ("incremental", {}),
+        ("hemisphere", {}),
+        ("forward", {"shadow_maps.projection": "paraboloid"}),
+    ],
+)
+@pytest.mark.parametrize("linear", [True, False])
+def test_the_map_of_any_light_stands_in_the_corner(viewer, graph, settings, linear):
+    viewer.session.change(graph, {**FEW, **settings})
+    viewer.controls.switches["map"] = True
+    maps, edge = viewer.panel.maps, round(0.33 * SIZE[1])
+    maps.linear, maps.intensity = linear, 1.0
+    viewer.frame()
+    lights = records(viewer.session)
+    tiles = sorted(lights["tile"][shining(lights)].astype(int).tolist())
+    assert len(tiles) > 4
+    for maps.light in (0, 2, len(tiles) - 1):
+        viewer.frame()
+        depth = depths(viewer, tiles[maps.light])
+        texels = (np.arange(edge) * len(depth)) // edge
+        near = depth[np.ix_(texels, texels)] / NEAR
+        shown = np.divide(1.0, near, out=np.zeros_like(near), where=near > 0) if linear else 0.03 * near
+        corner = picture(viewer)[::-1][:edge, :edge, 0]
+        assert np.abs(corner - 255 * shown.clip(0, 1)).max() <= 1
+        assert corner.any()
+    maps.light, maps.linear = 0, True
+
+
+def depths(viewer, tile):
+    """The map of a light, whichever graph drew it: tile -1 is the spotlight's."""
+    session = viewer.session
+    with viewer.window:
+        if session.graph == "forward":
+            port, number = ("spot", 0) if tile < 0 else ("vpls", tile)
+            return session.output(("shadow_maps", port))[number].read()[..., 0]
+        atlas, size = session.output(("shadow_maps", "atlas")).read()[..., 0], 256
+        if tile < 0:
+            return atlas[0]
+        layer, place = divmod(tile, (atlas.shape[1] // size) ** 2)
+        y, x = divmod(place, atlas.shape[1] // size)
+        return atlas[1 + layer, y * size : (y + 1) * size, x * size : (x + 1) * size]
+
+
+def test_no_word_of_the_panel_is_clipped(tall):
+    """With all parts open, in the graph with the most parameters."""
+    viewer = tall
+    viewer.session.choose("accurate")
+    viewer.session.adjust("vpl.count", 4)
+    viewer.controls.switches["map"] = True
+    frames(viewer, 2)
+    panel = viewer.panel
+    parts = [panel, panel.passes, panel.maps, panel.truth]
+    spies = [Spy(part, open_all=True) for part in parts]
+    for _ in range(2):  # what opens is laid out in the frame after
+        for spy in spies:
+            spy.__enter__()
+        viewer.frame()
+        for spy in spies:
+            spy.__exit__()
+    right = viewer.window.size[0]
+    known = {name: place for spy in spies for name, place in spy.places.items()}
+    assert {"scene", "light FOV", "clamp", "paths a pixel", "linear depth"} <= known.keys()
+    assert not {name: place for name, place in known.items() if place[2] > right}
+
+
+def test_a_graph_of_ones_own_is_saved_whole(viewer, tmp_path, monkeypatch):
+    monkeypatch.setattr(panels, "FOLDER", tmp_path)
+    own = tmp_path / "own" / "mine.toml"
+    own.parent.mkdir()
+    own.write_text('extends = "interleaved"\n[passes.interleave]\nn = 2\n[passes.tonemap]\noperator = "aces"\n')
+    viewer.session.change(str(own), FEW)
+    viewer.session.adjust("gather.angle", 12.0)
+    viewer.frame()
+    act(viewer, "key", "ctrl+s")
+    assert viewer.session.error == ""
+    saved = load_graph(tmp_path / "cornell-1-graph.toml")
+    assert graph_hash(saved) == graph_hash(viewer.session.renderer.graph())
+    own.unlink()
+    again = ["render", str(tmp_path / "cornell-1.toml"), "--device", "software", "-o", str(tmp_path / "again.png")]
+    assert cli.main(again) == 0
+    with Image.open(tmp_path / "cornell-1.png") as one, Image.open(tmp_path / "again.png") as other:
+        assert np.array_equal(np.asarray(one), np.asarray(other))
+    act(viewer, "key", "ctrl+s")
+    assert (tmp_path / "cornell-2-graph.toml").exists()
+
+
+@pytest.fixture
+def moving(tmp_path):
+    """A scene file in whose middle a box moves."""
+    cornell = load("cornell")
+    (tmp_path / "box.obj").write_text(
+        "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", encoding="utf-8"
+    )
+    scene = tmp_path / "moving.toml"
+    scene.write_text(
+        f'[[model]]\npath = "{cornell.path.parent / "cornell.obj"}"\n[[model]]\npath = "box.obj"\n'
+        "[model.motion]\ntimes = [0, 1]\ntranslations = [[0.1, 0.1, 0.3], [0.4, 0.3, 0.3]]\n"
+        "rotations = [[0, 0, 0, 1], [0, 0.38, 0, 0.92]]\n"
+        f"[camera]\nposition = {list(cornell.camera.position)}\nlook_at = {list(cornell.camera.look_at)}\n"
+        f"[spotlight]\nposition = {list(cornell.spotlight.position)}\nlook_at = {list(cornell.spotlight.look_at)}\n"
+        f"emission = {list(cornell.spotlight.emission)}\n"
+    )
+    return scene
+
+
+def test_models_that_move_play_and_are_saved_where_they_are(viewer, moving, tmp_path, monkeypatch):
+    monkeypatch.setattr(panels, "FOLDER", tmp_path)
+    session = viewer.session
+    session.open(str(moving))
+    session.change("deferred", FEW)
+    viewer.frame()
+    before = picture(viewer)
+    assert np.array_equal(before, rendered(load(moving), set=FEW))
+    assert "play motions (P)" in [word for _, word in words(viewer, viewer.panel)]
+    act(viewer, "key", "p", frames=1)
+    while session.time < 0.2:
+        viewer.frame()
+    assert session.playing
+    act(viewer, "key", "p", frames=2)
+    viewer.frame()
+    assert not session.playing
+    assert np.array_equal(picture(viewer), rendered(load(moving), set=FEW, time=session.time))
+    assert not np.array_equal(picture(viewer), before)
+    act(viewer, "key", "ctrl+s")
+    saved = tmp_path / f"{session.scene.name}-1.toml"
+    assert cli.main(["render", str(saved), "--device", "software", "-o", str(tmp_path / "again.png")]) == 0
+    with Image.open(saved.with_suffix(".png")) as one, Image.open(tmp_path / "again.png") as other:
+        assert np.array_equal(np.asarray(one), np.asarray(other))
+
+
+def test_a_camera_path_is_recorded_by_the_checkbox_played_and_saved(viewer, tmp_path, monkeypatch):
+    from deferred_ir.viewer import path
+
+    monkeypatch.setattr(panels, "FOLDER", tmp_path)
+    monkeypatch.setattr(path, "PERIOD", 0.0)
+    session, start = viewer.session, viewer.session.camera
+    session.record(True)
+    viewer.frame()
+    act(viewer, "keydown", "w")
+    act(viewer, "keyup", "w")
+    end = session.camera
+    session.record(False)
+    assert session.camera == start
+    assert session.scene.spotlight.motion is None
+    act(viewer, "key", "ctrl+s")
+    saved = load(tmp_path / "cornell-1.toml")
+    assert saved.camera.motion == session.scene.camera.motion is not None
+    assert np.allclose(saved.at(saved.camera.motion.times[-1]).camera.position, end.position)
+    act(viewer, "key", "p", frames=2)
+    assert session.camera != start
+    assert np.array_equal(picture(viewer), rendered(replace(saved, camera=session.camera), set=FEW))
+
+
+def test_frames_of_incremental_go_on_until_they_come_to_rest(viewer):
+    viewer.session.choose("incremental")
+    viewer.session.adjust("vpl.count", 16)
+    drawn = 0
+    while viewer.frame() and drawn < 50:
+        drawn += 1
+    assert 1 < drawn < 50
+    assert not viewer.frame()
+
+
+def test_a_number_is_typed_into_a_slider(tall):
+    """By Ctrl and click."""
+    viewer = tall
+    x, y = middle(viewer, viewer.panel, "light FOV")
+    act(viewer, "mousemove", "--sync", x, y, "keydown", "ctrl", "click", 1, "keyup", "ctrl")
+    xdo("key", "ctrl+a")
+    act(viewer, "type", "60")
+    act(viewer, "key", "Return")
+    assert viewer.session.spotlight.fov == pytest.approx(60.0)
+    assert viewer.session.camera == load("cornell").camera, "keys in a field fly nothing"

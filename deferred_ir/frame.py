@@ -57,7 +57,7 @@ class Frame:
     @property
     def near(self) -> float:
         """Near plane of the camera and of all lights, in world units."""
-        return NEAR * self.scene.geometry.diagonal
+        return NEAR * self.scene.geometry.scale
 
     def surfaces(self, depth: GpuTexture, normals: GpuTexture) -> Surfaces:
         """What the pixels of a G-buffer show, read back when first asked for: after both textures were written."""

@@ -11,11 +11,16 @@ from functools import cached_property
 
 import numpy as np
 
+from .giants import graded
 from .motion import ModelMotion
 from .typing import Array, Ints, Vec3
 
 FAR = 4.0
-"""Scenes farther than this many of their diagonals from the origin are moved to it before 32 bits hold them."""
+"""Scenes farther than this many times their `scale` from the origin are moved to it before 32 bits hold them."""
+OUTLYING = 16.0
+"""Things farther out than this many times the median distance of vertices from their middle leave `scale` as it is."""
+SAMPLES = 1 << 16
+"""Corners of faces at most that medians are taken of."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,7 @@ class Geometry:
     uvs: float32 (V, 2), or None if no material has a texture.
     colors: float32 (V, 3) linear vertex colours that multiply the albedo, or None.
     moving: the models that have a motion; `positions` are where their files put them, or where `posed` did.
+    medians: `middle` and `spread` where they are not to be taken from the faces.
     """
 
     positions: Array
@@ -58,6 +64,7 @@ class Geometry:
     uvs: Array | None = None
     colors: Array | None = None
     moving: tuple[Model, ...] = ()
+    medians: tuple[Array, float] | None = None
     _rest: Geometry | None = None
     _poses: Array | None = None
     _last: list[Geometry] = field(default_factory=list, init=False)
@@ -153,17 +160,46 @@ class Geometry:
         return float(np.linalg.norm(self.extent[1] - self.extent[0]))
 
     @cached_property
+    def middle(self) -> Array:
+        """The median of the corners of faces, which things far out hardly move, float64 (3,); the same at all times."""
+        return self._rest.middle if self._rest else self.medians[0] if self.medians else np.median(self._some, axis=0)
+
+    @cached_property
+    def spread(self) -> float:
+        """The median of the distances of the corners of faces from the middle; the same at all times."""
+        if self._rest:
+            return self._rest.spread
+        away = np.linalg.norm(self._some - self.middle, axis=1)
+        return self.medians[1] if self.medians else float(np.median(away))
+
+    @property
+    def _some(self) -> Array:
+        """Corners of faces, (n, 3): all, or SAMPLES of very many, with moving models at their first keyframes."""
+        used = self.faces.ravel()
+        first = [model.motion.matrix(model.motion.times[0]) for model in self.moving if model.motion]
+        positions = self.posed(np.stack(first)).positions if first else self.positions
+        return positions[used[:: -(-len(used) // SAMPLES)]]
+
+    @cached_property
+    def scale(self) -> float:
+        """What near planes and offsets are fractions of: the diagonal, unless a few things lie very far out."""
+        return min(self.diagonal, OUTLYING * self.spread) if self.spread > 0 else self.diagonal
+
+    @cached_property
     def centre(self) -> Vec3:
-        """Where the origin of 32-bit coordinates lies: the middle of `extent` where that is far off, else 0."""
-        middle = self.extent.mean(axis=0)
-        x, y, z = middle.tolist() if np.abs(middle).max() > FAR * self.diagonal else (0.0, 0.0, 0.0)
+        """Where the origin of 32-bit coordinates lies: the middle of most where that is far off, else 0."""
+        middle = self.middle
+        x, y, z = middle.tolist() if np.abs(middle).max() > FAR * self.scale else (0.0, 0.0, 0.0)
         return x, y, z
 
     @cached_property
     def centred(self) -> Geometry:
-        """The same with `centre` as its origin, subtracted in 64 bits; itself where that is 0."""
+        """The same as 32 bits hold it best: with `centre` as its origin, and without giant triangles (giants.py).
+
+        Itself where nothing has to be done. Both are done in 64 bits.
+        """
         if not any(self.centre):
-            return self
+            return self._graded
         if self._rest:
             poses = self.poses.copy()
             poses[:, :3, 3] += poses[:, :3, :3] @ self.centre - self.centre
@@ -171,7 +207,16 @@ class Geometry:
         moving = tuple(
             replace(model, motion=model.motion.seen_from(self.centre)) for model in self.moving if model.motion
         )
-        return replace(self, positions=self.positions - self.centre, moving=moving)
+        middle = self.middle - self.centre
+        near = replace(self, positions=self.positions - self.centre, moving=moving, medians=(middle, self.spread))
+        return near._graded
+
+    @property
+    def _graded(self) -> Geometry:
+        if self._rest:
+            whole = self._rest.centred
+            return self if whole is self._rest else whole.posed(self.poses)
+        return graded(self)
 
 
 def corners(points: Array) -> Array:

@@ -92,11 +92,11 @@ class Scene:
     def centred(self) -> Scene:
         """The scene as it stands, near the origin: what the GPU and Embree, which hold 32 bits, are given.
 
-        Itself where it is near already (see Geometry.centre). Camera and light rest where they are.
+        Itself where they can hold it as it is (see Geometry.centred). Camera and light rest where they are.
         """
-        x, y, z = self.geometry.centre
-        if not (x or y or z):
+        if self.geometry.centred is self.geometry:
             return self
+        x, y, z = self.geometry.centre
         by = (-x, -y, -z)
         return replace(
             self,

@@ -23,7 +23,8 @@ from .typing import Array, Bools, Ints
 
 CHUNK = 1 << 15
 OFFSET = 1e-5
-"""Ray origins are pushed off their surface by this fraction of the scene's extent (float32 positions err by 1e-7)."""
+"""Ray origins are pushed off their surface by this fraction of the scene's scale, or of their own distance from the
+origin where that is larger: float32 positions err by 1e-7 of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +62,7 @@ class Tracer:
         self.scene = scene
         self.seconds = 0.0
         self._rays = Rays(scene.geometry)
-        extent = scene.geometry.extent
-        self.offset = OFFSET * float(max(scene.geometry.diagonal, np.abs(extent).max()))
+        self.offset = OFFSET * scene.geometry.scale
 
     def follow(self, scene: Scene) -> None:
         """Go on with the same triangles where `scene` has them: its moving models may be elsewhere."""
@@ -138,7 +138,8 @@ class Tracer:
 
     def lift(self, positions: Array, normals: Array) -> Array:
         """Points pushed off their surfaces along `normals`, so that rays from them do not meet it again."""
-        lifted: Array = positions + normals * self.offset
+        far = OFFSET * np.abs(positions).max(axis=-1, keepdims=True)
+        lifted: Array = positions + normals * np.maximum(far, self.offset)
         return lifted
 
 

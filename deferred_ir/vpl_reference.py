@@ -35,7 +35,7 @@ class Lights:
     lifted: Array  # off their surface, where they are
     emission: Array  # float64
     edge: np.float32  # squared cosine of the half cone angle
-    clamp: np.float32  # c^2, c in diagonals
+    clamp: np.float32  # c^2, in diagonals
 
     @classmethod
     def of(cls, tracer: Tracer, vpls: Vpls, *, fov: float, clamp: float) -> Lights:
@@ -46,12 +46,12 @@ class Lights:
             tracer.lift(vpls.position, vpls.normal).astype(np.float32),
             vpls.emission,
             np.float32((1 - one_minus_cos(fov)) ** 2) if fov < 180 else np.float32(0),
-            np.float32(clamp**2),
+            np.float32((clamp * tracer.scene.geometry.diagonal / tracer.scene.geometry.scale) ** 2),
         )
 
 
 class Patch:
-    """Some pixels' surfaces, coordinate by coordinate. Positions are centred and in diagonals of the scene.
+    """Some pixels' surfaces, coordinate by coordinate. Positions are about the scene's middle, in its scale.
 
     There single precision is finest, and fourth powers of distances fit in it, whatever the scene's unit.
     """
@@ -64,7 +64,7 @@ class Patch:
         self.lifted = tracer.lift(seen.position, seen.normal).astype(np.float32)
 
     def kernels(self, lights: Lights) -> Array:
-        """cos cos V / max(d^2, c^2) for all n pixels and all m VPLs, times the squared diagonal, float32 (n, m)."""
+        """cos cos V / max(d^2, c^2) for all n pixels and all m VPLs, times the squared scale, float32 (n, m)."""
         position, normal = (np.ascontiguousarray(part.T)[:, None] for part in (lights.position, lights.normal))
         way = self.position[..., None] - position
         normals = self.normal[..., None], self.shading_normal[..., None]
@@ -75,7 +75,7 @@ class Patch:
         return result
 
     def irradiance(self, lights: Lights, chosen: slice) -> Array:
-        """Irradiance by the VPLs `chosen`, times the squared diagonal, float64 (3, n)."""
+        """Irradiance by the VPLs `chosen`, times the squared scale, float64 (3, n)."""
         total = np.zeros(self.position.shape)
         for i in range(chosen.start, chosen.stop):
             if not lights.emission[i].any():
@@ -99,7 +99,7 @@ def _kernel(
 ) -> Array:
     """cos cos / max(d^2, c^2) without visibility, float32 (...), as in shaders/lib/light.glsl.
 
-    way: from VPLs to surfaces, in diagonals of the scene. Coordinates are the first axis of `way` and of the normals,
+    way: from VPLs to surfaces, in scales of the scene. Coordinates are the first axis of `way` and of the normals,
     the rest is broadcast. edge: squared cosine of the half cone angle. clamp: c^2.
     """
     square = _dot(way, way)
@@ -112,7 +112,7 @@ def _kernel(
 
 def _centred(tracer: Tracer, positions: Array) -> Array:
     geometry = tracer.scene.geometry
-    centred: Array = (positions - geometry.bounds.mean(axis=0)) / geometry.diagonal
+    centred: Array = (positions - geometry.middle) / geometry.scale
     return centred
 
 
@@ -151,5 +151,5 @@ def indirect(
             total[patches[patch]] += part.T
             if progress:
                 progress(done, len(tasks))
-    radiance: Array = total * seen.albedo / (np.pi * tracer.scene.geometry.diagonal**2)
+    radiance: Array = total * seen.albedo / (np.pi * tracer.scene.geometry.scale**2)
     return radiance

@@ -68,12 +68,12 @@ class ThinRays(Pass):
 
 def _irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, parts: int) -> Array:
     """Of surfaces (n), from those of `parts` shares of the VPLs (LIGHT records) that have a bit in bits (n, 2)."""
-    diagonal = tracer.scene.geometry.diagonal
+    geometry = tracer.scene.geometry
     lights = Lights.of(
         tracer,
         Vpls(vpls["position"], vpls["z_axis"], vpls["emission"].astype(float), np.arange(len(vpls))),
         fov=2 * degrees(acos(1 - float(vpls["one_minus_cos"][0]))),
-        clamp=sqrt(vpls["clamp_squared"][0]) / diagonal,
+        clamp=sqrt(vpls["clamp_squared"][0]) / geometry.diagonal,
     )
     starts = deal(len(vpls), round(parts**0.5))[1].tolist()
     hits = Hits(np.zeros(len(bits), int), seen.position, seen.normal, seen.shading_normal, np.ones((len(bits), 3)))
@@ -87,7 +87,7 @@ def _irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, pa
     with closing(in_order(work, tasks)) as results:
         for share, part in zip(tasks, results, strict=True):
             total[rows[share]] += part.T
-    irradiance: Array = total / diagonal**2
+    irradiance: Array = total / geometry.scale**2
     return irradiance
 
 

@@ -201,7 +201,7 @@ def judged(renderer: Renderer, scene: Scene, source: str) -> Pairs:
         records = renderer.executor.resource(("vpl", "lights")).records
     counts = pairs[..., 2] > 0  # what faces away, or lies outside the cone, gets nothing
     number, shown, irradiance, depth = pairs[counts].astype(np.float64).T
-    away = np.float32(NEAR * scene.geometry.diagonal) / depth
+    away = np.float32(NEAR * scene.geometry.scale) / depth
     position = np.asarray(scene.camera.position) + scene.camera.rays(renderer.size)[counts] * away[:, None]
     normal, light = facing[counts, :3].astype(np.float64), number.astype(int)
     lit = ~_blocked(renderer.tracer(), position, normal, records[light])

@@ -33,7 +33,7 @@ def test_a_scene_near_the_origin_stays_as_it_is() -> None:
 def test_a_scene_far_away_is_moved_in_64_bits() -> None:
     scene, far = load("cornell"), away(load("cornell"))
     centred = far.centred
-    middle = scene.geometry.bounds.mean(axis=0)
+    middle = scene.geometry.middle
     assert centred.centred is centred
     assert centred.geometry.positions == pytest.approx(scene.geometry.positions - middle, abs=1e-10)
     assert centred.camera.position == pytest.approx(np.subtract(scene.camera.position, middle), abs=1e-10)

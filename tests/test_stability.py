@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from small_scenes import box, build, room
 
 from deferred_ir.lights import Spotlight
+from deferred_ir.reference import reference
+from deferred_ir.scene import Scene
 
 
 def test_vpls_beside_an_edge_do_not_shine_through_the_other_wall(renderer) -> None:
@@ -20,3 +23,52 @@ def test_vpls_beside_an_edge_do_not_shine_through_the_other_wall(renderer) -> No
     assert one.render(scene).radiance.max() == 0
     inside = replace(scene, camera=replace(scene.camera, position=(0.0, 0.0, 0.012), look_at=(0.0, 0.0, 0.0)))
     assert np.all(one.render(inside).radiance.max(axis=-1) > 0)
+
+
+def giant(scene: Scene, times: float) -> Scene:
+    """`scene` with a triangle so much larger, aslant, that cuts its far part off."""
+    corners = [(-0.9, -1.0, -0.8), (1.0, -0.9, -0.7), (-0.05, 0.95, 0.75)]  # their middle is the origin
+    plane = np.multiply(corners, times) - (0, 0, 0.6)
+    g = scene.geometry
+    return replace(
+        scene,
+        geometry=replace(
+            g,
+            positions=np.concatenate([g.positions, plane]),
+            faces=np.concatenate([g.faces, [len(g.positions) + np.arange(3)]]).astype(np.int32),
+            face_materials=np.append(g.face_materials, 0).astype(np.int32),
+        ),
+    )
+
+
+@pytest.mark.parametrize("times", [1e3, 1e6])
+def test_a_giant_triangle_spoils_nothing(renderer, times: float) -> None:
+    """Near planes, offsets and roundings went by the diagonal. It is what a triangle of 8 scenes' width shows."""
+    one = renderer((64, 64), set={"vpl.count": 8, "vpl.clamp": 0.0, "shadow_maps.vpl_size": 128})
+    wanted = one.render(giant(room(), 8.0)).radiance
+    found = one.render(giant(room(), times)).radiance
+    assert np.abs(found - wanted).mean() < 2e-3 * wanted.mean()
+    traced = reference(giant(room(), times), (64, 64), vpls=8, settings={"vpl.clamp": 0.0}).radiance
+    assert np.abs(traced - wanted).mean() < 0.03 * wanted.mean()
+
+
+def test_a_giant_is_cut_up_where_the_scene_is() -> None:
+    whole = giant(room(), 1e6).geometry
+    parts = whole.centred
+    assert parts.centred is parts
+    assert len(whole.faces) < len(parts.faces) < 1000
+    edges = np.diff(parts.positions[parts.faces], axis=1)
+    near = np.abs(parts.positions[parts.faces]).max(axis=(1, 2)) < 10
+    assert np.linalg.norm(edges[near], axis=2).max() <= 16 * parts.scale
+    area = [
+        np.linalg.norm(np.cross(*np.moveaxis(np.diff(g.positions[g.faces], axis=1), 1, 0)), axis=1).sum()
+        for g in (whole, parts)
+    ]
+    assert area[1] == pytest.approx(area[0], rel=1e-12)
+
+
+def test_the_scale_is_the_diagonal_unless_things_lie_far_out() -> None:
+    scene = room()
+    assert scene.geometry.scale == scene.geometry.diagonal
+    assert scene.geometry.centred is scene.geometry
+    assert giant(scene, 1e6).geometry.scale < 20 * scene.geometry.diagonal

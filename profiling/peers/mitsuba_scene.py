@@ -41,7 +41,7 @@ def _sensor(mi: Any, scene: Scene, size: tuple[int, int]) -> dict[str, Any]:
         "type": "perspective",
         "fov": camera.fov,
         "fov_axis": "y",
-        "near_clip": NEAR * geometry.diagonal,
+        "near_clip": NEAR * geometry.scale,
         "far_clip": FAR * reach,
         "to_world": mi.ScalarTransform4f().look_at(
             origin=list(camera.position), target=list(camera.look_at), up=list(camera.up)

@@ -74,17 +74,16 @@ def screen() -> Iterator[str]:
 @pytest.fixture(scope="session")
 def viewer_window(screen: str) -> Iterator[Any]:
     """One window for all tests; at the end it is closed while a reference is traced."""
-    from virtual_display import FEW, SIZE, close_renderer, xdo
+    from virtual_display import FEW, SIZE, close_renderer, cornell, xdo
 
     from deferred_ir.gl.window import Window
-    from deferred_ir.loading import load
     from deferred_ir.viewer.app import Viewer
     from deferred_ir.viewer.panel import WIDTH
     from deferred_ir.viewer.session import Session
 
     del screen
     window = Window("deferred-ir test", (SIZE[0] + WIDTH, SIZE[1]))
-    viewer = Viewer(window, Session(load("cornell"), SIZE, window, settings=FEW))
+    viewer = Viewer(window, Session(cornell(), SIZE, window, settings=FEW))
     viewer.frame()
     xdo("search", "--sync", "--name", "deferred-ir test", "windowfocus", "--sync")
     yield viewer

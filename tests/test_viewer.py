@@ -10,15 +10,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-from virtual_display import FEW, SIZE, act, picture, rendered, xdo
+from virtual_display import FEW, SIZE, act, cornell, picture, rendered, xdo
 
 from deferred_ir import cli
-from deferred_ir.loading import load
 from deferred_ir.viewer.panel import WIDTH
 
 
 def test_the_picture_on_screen_is_the_one_that_render_makes(viewer):
-    expected = rendered(load("cornell"), set=FEW)
+    expected = rendered(cornell(), set=FEW)
     assert np.array_equal(picture(viewer), expected)
 
 
@@ -69,7 +68,7 @@ def test_keys_fly_the_camera_along_its_axes(viewer, key, axis, sign):
     step = before.axes @ np.subtract(viewer.session.camera.position, before.position)
     assert sign * step[axis] > 0
     assert np.allclose(np.delete(step, axis), 0)
-    assert np.array_equal(picture(viewer), rendered(replace(load("cornell"), camera=viewer.session.camera), set=FEW))
+    assert np.array_equal(picture(viewer), rendered(replace(cornell(), camera=viewer.session.camera), set=FEW))
 
 
 def test_the_mouse_turns_the_camera(viewer):

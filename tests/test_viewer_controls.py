@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from PIL import Image
-from virtual_display import FEW, SIZE, Spy, act, frames, middle, picture, rendered, xdo
+from virtual_display import FEW, SIZE, Spy, act, cornell, frames, middle, picture, rendered, xdo
 
 from deferred_ir import cli
 from deferred_ir.exposure import automatic_stops
@@ -31,7 +31,7 @@ def test_a_parameter_rebuilds_nothing_and_runs_only_what_reads_it(viewer):
     assert dict(executor._resources) == kept
     assert executor.library.compiled == compiled
     assert set(session.laps) == {"tonemap"}
-    assert np.array_equal(picture(viewer), rendered(load("cornell"), set={**FEW, "tonemap.exposure": -3.0}))
+    assert np.array_equal(picture(viewer), rendered(cornell(), set={**FEW, "tonemap.exposure": -3.0}))
 
 
 def test_nothing_runs_where_nothing_changes(viewer):
@@ -47,7 +47,7 @@ def test_every_graph_can_be_chosen(viewer, graph):
     viewer.session.adjust("vpl.count", 8)
     viewer.frame()
     assert viewer.session.error == ""
-    assert np.array_equal(picture(viewer), rendered(load("cornell"), graph=graph, set=FEW))
+    assert np.array_equal(picture(viewer), rendered(cornell(), graph=graph, set=FEW))
 
 
 def test_a_setting_that_cannot_be_leaves_the_picture_and_tells(viewer):
@@ -70,7 +70,7 @@ def test_keys_move_the_light(viewer):
     assert step[0] > 0
     assert np.allclose(step[1:], 0)
     assert np.allclose(light.axis, before.axis)
-    assert np.array_equal(picture(viewer), rendered(replace(load("cornell"), spotlight=light), set=FEW))
+    assert np.array_equal(picture(viewer), rendered(replace(cornell(), spotlight=light), set=FEW))
 
 
 def test_the_right_button_moves_the_light(viewer):
@@ -92,7 +92,7 @@ def test_the_light_is_put_at_the_camera_and_seen_from(viewer):
     act(viewer, "key", "v")
     assert session.from_light
     assert session.eye.fov == session.spotlight.fov
-    shown = replace(load("cornell"), camera=session.eye, spotlight=session.spotlight)
+    shown = replace(cornell(), camera=session.eye, spotlight=session.spotlight)
     assert np.array_equal(picture(viewer), rendered(shown, set=FEW))
 
 
@@ -127,7 +127,7 @@ def test_the_output_of_a_pass_is_shown_while_pinned(viewer):
     assert np.abs(picture(viewer) - 255 * np.clip(encoded, 0, 1)).max() <= 1
     viewer.panel.passes.pinned = ("shadow_maps", "gone")
     viewer.frame()
-    assert np.array_equal(picture(viewer), rendered(load("cornell"), set=FEW))
+    assert np.array_equal(picture(viewer), rendered(cornell(), set=FEW))
     viewer.panel.passes.pinned = None
 
 
@@ -151,7 +151,7 @@ def test_a_dark_light_leaves_passes_out_and_back(viewer):
     assert "shadow_maps" in viewer.session.plan.left_out
     viewer.session.shine(light)
     viewer.frame()
-    assert np.array_equal(picture(viewer), rendered(load("cornell"), set=FEW))
+    assert np.array_equal(picture(viewer), rendered(cornell(), set=FEW))
 
 
 def test_space_averages_frames_and_a_move_starts_again(viewer):
@@ -159,7 +159,7 @@ def test_space_averages_frames_and_a_move_starts_again(viewer):
     while not viewer.session.accumulation or viewer.session.accumulation.frames < 4:
         viewer.frame()
     assert "relMSE" in viewer.session.noise_text
-    assert np.array_equal(picture(viewer), rendered(load("cornell"), set=FEW, accumulate=4))
+    assert np.array_equal(picture(viewer), rendered(cornell(), set=FEW, accumulate=4))
     viewer.session.adjust("tonemap.operator", "none")
     viewer.frame()
     assert viewer.session.accumulation.frames == 4, "what comes after the mean changes without starting again"
@@ -200,14 +200,14 @@ def test_both_sides_of_the_split_have_the_exposure_of_the_picture(viewer):
     panel.truth.result = replace(panel.truth.result, radiance=4 * radiance)
     frames(viewer, 2)
     half, stops = SIZE[0] // 2, automatic_stops(radiance)
-    expected = rendered(load("cornell"), set={**FEW, "tonemap.exposure": stops + 2})
+    expected = rendered(cornell(), set={**FEW, "tonemap.exposure": stops + 2})
     assert np.array_equal(picture(viewer)[:, half:], expected[:, half:])
-    same = rendered(load("cornell"), set={**FEW, "tonemap.exposure": stops}).astype(int)
+    same = rendered(cornell(), set={**FEW, "tonemap.exposure": stops}).astype(int)
     assert np.abs(picture(viewer)[:, :half] - same[:, :half]).max() <= 1
     session.adjust("vpl.count", 4)
     frames(viewer, 2)
     stops = automatic_stops(session.image().radiance)
-    expected = rendered(load("cornell"), set={"vpl.count": 8, "tonemap.exposure": automatic_stops(radiance)})
+    expected = rendered(cornell(), set={"vpl.count": 8, "tonemap.exposure": automatic_stops(radiance)})
     assert np.array_equal(picture(viewer)[:, half:], session.toned(4 * radiance, stops)[::-1, half:, :3])
 
 
@@ -309,7 +309,7 @@ def test_shaders_and_graphs_are_read_again_and_a_broken_edit_keeps_the_picture(v
     tonemap.write_text(text)
     frames(viewer)
     assert viewer.session.error == ""
-    assert np.array_equal(picture(viewer), rendered(load("cornell"), set={"vpl.count": 4}))
+    assert np.array_equal(picture(viewer), rendered(cornell(), set={"vpl.count": 4}))
 
 
 def test_a_slider_is_dragged_by_the_mouse(viewer):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from PIL import Image
-from virtual_display import FEW, SIZE, Spy, act, frames, middle, picture, rendered, xdo
+from virtual_display import FEW, SIZE, Spy, act, cornell, frames, middle, picture, rendered, xdo
 
 from deferred_ir import cli
 from deferred_ir.config import graph_hash, load_graph
@@ -90,22 +91,20 @@ def test_passes_that_are_kept_are_told(viewer):
         ("forward", {"shadow_maps.projection": "paraboloid"}),
     ],
 )
-@pytest.mark.parametrize("linear", [True, False])
-def test_the_map_of_any_light_stands_in_the_corner(viewer, graph, settings, linear):
+def test_the_map_of_any_light_stands_in_the_corner(viewer, graph, settings):
     viewer.session.change(graph, {**FEW, **settings})
     viewer.controls.switches["map"] = True
     maps, edge = viewer.panel.maps, round(0.33 * SIZE[1])
-    maps.linear, maps.intensity = linear, 1.0
     viewer.frame()
     lights = records(viewer.session)
     tiles = sorted(lights["tile"][shining(lights)].astype(int).tolist())
     assert len(tiles) > 4
-    for maps.light in (0, 2, len(tiles) - 1):
+    for maps.light, maps.linear in product((0, 2, len(tiles) - 1), (True, False)):
         viewer.frame()
         depth = depths(viewer, tiles[maps.light])
         texels = (np.arange(edge) * len(depth)) // edge
         near = depth[np.ix_(texels, texels)] / NEAR
-        shown = np.divide(1.0, near, out=np.zeros_like(near), where=near > 0) if linear else 0.03 * near
+        shown = np.divide(1.0, near, out=np.zeros_like(near), where=near > 0) if maps.linear else 0.03 * near
         corner = picture(viewer)[::-1][:edge, :edge, 0]
         assert np.abs(corner - 255 * shown.clip(0, 1)).max() <= 1
         assert corner.any()
@@ -173,18 +172,18 @@ def test_a_graph_of_ones_own_is_saved_whole(viewer, tmp_path, monkeypatch):
 @pytest.fixture
 def moving(tmp_path):
     """A scene file in whose middle a box moves."""
-    cornell = load("cornell")
+    first = cornell()
     (tmp_path / "box.obj").write_text(
         "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n", encoding="utf-8"
     )
     scene = tmp_path / "moving.toml"
     scene.write_text(
-        f'[[model]]\npath = "{cornell.path.parent / "cornell.obj"}"\n[[model]]\npath = "box.obj"\n'
+        f'[[model]]\npath = "{first.path.parent / "cornell.obj"}"\n[[model]]\npath = "box.obj"\n'
         "[model.motion]\ntimes = [0, 1]\ntranslations = [[0.1, 0.1, 0.3], [0.4, 0.3, 0.3]]\n"
         "rotations = [[0, 0, 0, 1], [0, 0.38, 0, 0.92]]\n"
-        f"[camera]\nposition = {list(cornell.camera.position)}\nlook_at = {list(cornell.camera.look_at)}\n"
-        f"[spotlight]\nposition = {list(cornell.spotlight.position)}\nlook_at = {list(cornell.spotlight.look_at)}\n"
-        f"emission = {list(cornell.spotlight.emission)}\n"
+        f"[camera]\nposition = {list(first.camera.position)}\nlook_at = {list(first.camera.look_at)}\n"
+        f"[spotlight]\nposition = {list(first.spotlight.position)}\nlook_at = {list(first.spotlight.look_at)}\n"
+        f"emission = {list(first.spotlight.emission)}\n"
     )
     return scene
 
@@ -256,4 +255,4 @@ def test_a_number_is_typed_into_a_slider(tall):
     act(viewer, "type", "60")
     act(viewer, "key", "Return")
     assert viewer.session.spotlight.fov == pytest.approx(60.0)
-    assert viewer.session.camera == load("cornell").camera, "keys in a field fly nothing"
+    assert viewer.session.camera == cornell().camera, "keys in a field fly nothing"

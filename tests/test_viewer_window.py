@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from virtual_display import FEW, SIZE, act, frames, picture, rendered, xdo
+from virtual_display import FEW, SIZE, act, cornell, frames, picture, rendered, xdo
 from x_client import Client
 
 from deferred_ir.loading import load
@@ -118,7 +118,7 @@ def test_a_frame_shows_all_input_that_came_before_it(viewer):
     assert viewer.frame(0.05)
     step = session.camera.axes @ np.subtract(session.spotlight.position, light.position)
     assert step[0] == pytest.approx(20 * session.scene.geometry.diagonal / 2 / SIZE[1])
-    expected = replace(load("cornell"), spotlight=session.spotlight)
+    expected = replace(cornell(), spotlight=session.spotlight)
     assert np.array_equal(picture(viewer), rendered(expected, set=FEW))
     act(viewer, "mouseup", 3)
     before = session.camera

@@ -6,8 +6,10 @@ import os
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
+from deferred_ir.loading import load
 from deferred_ir.renderer import Renderer
 from deferred_ir.scene import Scene
 from deferred_ir.viewer.app import Viewer
@@ -17,6 +19,12 @@ SCREEN = "1700x1000x24"
 SIZE = (128, 96)
 """Of the picture."""
 FEW = {"vpl.count": 8}
+
+
+@cache
+def cornell() -> Scene:
+    """The Cornell box, which most tests are about, read once."""
+    return load("cornell")
 
 
 @contextmanager
@@ -49,10 +57,13 @@ def xdo(*words: object) -> None:
 
 
 def act(viewer: Viewer, *words: object, frames: int = 4) -> None:
-    """Let xdotool make an event, and the viewer take it: Dear ImGui spreads a press and its release over frames."""
+    """Let xdotool make events, and the viewer take them: Dear ImGui spreads a press and its release over frames.
+
+    When xdotool has ended they wait to be taken.
+    """
     xdo(*words)
-    for number in range(frames):
-        viewer.frame(0.01 if number else 0.05)
+    for _ in range(frames):
+        viewer.frame()
         with viewer.window:
             viewer.window.show()
 
@@ -84,19 +95,16 @@ def close_renderer() -> None:
 def frames(viewer: Viewer, count: int = 4) -> None:
     """Some frames without input."""
     for _ in range(count):
-        viewer.frame(0.005)
+        viewer.frame()
 
 
 def restore(viewer: Viewer) -> None:
     """The window as it was at first: the Cornell box, seen and lit as its file says, and nothing else chosen."""
     session, panel = viewer.session, viewer.panel
-    first = vars(viewer).setdefault("first", session.scene)
-    if session.scene is first:
-        session.look(first.camera)
-        session.shine(first.spotlight)
-    else:
-        session.open("cornell")
-        vars(viewer)["first"] = session.scene
+    if session.scene is not cornell():
+        session.use(cornell())
+    session.look(cornell().camera)
+    session.shine(cornell().spotlight)
     if (session.graph, session.settings) != ("deferred", FEW) or session.error:
         session.change("deferred", FEW)
     session.seed, session.from_light, session.playing, session.progressive = 0, False, False, False
@@ -104,7 +112,7 @@ def restore(viewer: Viewer) -> None:
     panel.truth.truth.result, panel.passes.pinned, panel.maps.light, panel.saved = None, None, 0, ""
     viewer.controls.switches.update(frames=False, map=False, panel=True)
     viewer.window.resize((SIZE[0] + WIDTH, SIZE[1]))
-    act(viewer, "mousemove", 5, 5, "mousemove", 20, 20, frames=3)
+    act(viewer, "mousemove", 20, 20, frames=2)
     assert session.size == SIZE
     assert session.error == ""
 

@@ -46,6 +46,7 @@ class Window:
             glfw.terminate()
             raise DeviceError(f"view: no window with OpenGL 4.3 ({_last(failures)}); {ELSE}")
         self._before: list[Any] = []
+        self._look()
         glfw.make_context_current(self._window)
         glfw.swap_interval(0)  # a slow frame must not wait for the next refresh of the screen
         self.gl = raw.GL(self)
@@ -71,14 +72,19 @@ class Window:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height in pixels; 0 while it is minimised on some systems."""
-        width, height = self._glfw.get_framebuffer_size(self._window)
-        return int(width), int(height)
+        """Width and height in pixels as the frame began; 0 while it is minimised on some systems."""
+        return self._size
 
     @property
     def minimised(self) -> bool:
-        """Whether nothing of it can be seen."""
-        return bool(self._glfw.get_window_attrib(self._window, self._glfw.ICONIFIED)) or 0 in self.size
+        """Whether nothing of it could be seen as the frame began."""
+        return self._iconified or 0 in self._size
+
+    def _look(self) -> None:
+        """Ask for size and state, once a frame: that waits for an answer of the display."""
+        width, height = self._glfw.get_framebuffer_size(self._window)
+        self._size = int(width), int(height)
+        self._iconified = bool(self._glfw.get_window_attrib(self._window, self._glfw.ICONIFIED))
 
     @property
     def closing(self) -> bool:
@@ -91,6 +97,7 @@ class Window:
             self._glfw.wait_events_timeout(wait)
         else:
             self._glfw.poll_events()
+        self._look()
         self._imgui.backends.opengl3_new_frame()
         self._imgui.backends.glfw_new_frame()
         self._imgui.new_frame()

@@ -68,10 +68,11 @@ class Session:
         self._undo: Callable[[], None] = lambda: None
         self._still = False
         self.drawn: Plan | None = None
-        self._use(scene)
+        self.use(scene)
         self.plan = self._planned()
 
-    def _use(self, scene: Scene) -> None:
+    def use(self, scene: Scene) -> None:
+        """Show `scene`, from the start of its motions."""
         self.scene, self.time = scene, 0.0
         self._place(scene.at(0.0))
         self.emission = self.spotlight.emission
@@ -121,7 +122,7 @@ class Session:
         except Error as error:
             self.scene, self.error = before, str(error)
             return
-        self._use(scene)
+        self.use(scene)
 
     def change(self, graph: str | None = None, settings: Mapping[str, Any] | None = None) -> None:
         """Take another graph, or other settings, and read the graph's files again; the old ones stay if they fail."""
@@ -334,7 +335,7 @@ class Session:
         elif not on and self._path:
             scene, self._path = self._path.applied(self.scene), None
             emission = self.emission
-            self._use(scene)
+            self.use(scene)
             self.emission = emission
 
     def close(self) -> None:

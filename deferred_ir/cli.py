@@ -262,7 +262,7 @@ def _graph(arguments: argparse.Namespace) -> int:
     from .planning import compile
     from .scene import RenderDefaults
 
-    defaults, facts = RenderDefaults(), Facts()
+    defaults, facts, scene = RenderDefaults(), Facts(), None
     if arguments.scene is not None:
         from .loading import load
 
@@ -271,7 +271,7 @@ def _graph(arguments: argparse.Namespace) -> int:
         defaults = scene.render
     graph = config.load_graph(arguments.graph, chosen_settings(defaults, settings(arguments.set), arguments.vpls))
     plan = compile(graph, list(graph.outputs), facts)
-    print(plan_text.dot(graph, plan) if arguments.dot else plan_text.summary(plan))
+    print(plan_text.dot(graph, plan) if arguments.dot else plan_text.summary(plan, scene))
     return 0
 
 

@@ -38,7 +38,10 @@ Key = tuple[str, str, Description, tuple[int, int] | None, type[Pass]]
 
 
 class Executor:
-    """Owns what a plan needs on the GPU. `counters` holds what the passes published in the last frame."""
+    """Owns what a plan needs on the GPU. `counters` holds what the passes published in the last frame.
+
+    tenants: outputs that have the texture of another one, whose readers are done by then.
+    """
 
     def __init__(self, gpu: Gpu) -> None:
         self.gpu = gpu
@@ -49,7 +52,7 @@ class Executor:
         self._framebuffers: list[Framebuffer] = []
         self._plan: Plan | None = None
         self._size, self._shares = (0, 0), False
-        self._tenants: dict[tuple[str, str], tuple[str, str]] = {}
+        self.tenants: dict[tuple[str, str], tuple[str, str]] = {}
         self._ios: list[Io] = []
         self._runs = Runs()
         self.kept: tuple[str, ...] = ()
@@ -98,7 +101,7 @@ class Executor:
 
     def resource(self, source: tuple[str, str]) -> Any:
         """What (pass, port) wrote in the last frame; KeyError where another pass has written into it since."""
-        home = self._tenants.get(source, source)
+        home = self.tenants.get(source, source)
         found = next((r for key, r in self._resources.items() if key[:2] == home), None)
         if found is None:
             raise KeyError(f"{source[0]}.{source[1]} is not in the plan")
@@ -110,7 +113,7 @@ class Executor:
 
     def _last_tenant(self, home: tuple[str, str]) -> tuple[str, str]:
         """Whose the texture of `home` is at the end of a frame."""
-        return next((source for source, of in reversed(self._tenants.items()) if of == home), home)
+        return next((source for source, of in reversed(self.tenants.items()) if of == home), home)
 
     def ports(self, step: Step) -> dict[str, Any]:
         """Resources that a step of the plan reads and writes, by port; those that others have by now are left out."""
@@ -118,7 +121,7 @@ class Executor:
         sources |= {port: (step.name, port) for port in step.outputs}
         found = {}
         for port, source in sources.items():
-            if self._last_tenant(self._tenants.get(source, source)) == source:
+            if self._last_tenant(self.tenants.get(source, source)) == source:
                 found[port] = self.resource(source)
         return found
 
@@ -143,6 +146,15 @@ class Executor:
         buffers = sum(r.nbytes for r in self._all() if isinstance(r, GpuBuffer))
         return {"textures": textures, "buffers": buffers + self._frame_block.size}
 
+    def nbytes(self) -> dict[str, int]:
+        """Bytes of the textures and buffers that each output of the last plan has to itself, and of each pass."""
+        found: Counter[str] = Counter()
+        for (name, port, *_), resource in self._resources.items():
+            size = sum(single.nbytes for single in (resource if isinstance(resource, list) else [resource]))
+            found[f"{name}.{port}"] += size
+            found[name] += size
+        return dict(found)
+
     def _all(self) -> list[GpuTexture | GpuBuffer]:
         return [single for r in self._resources.values() for single in (r if isinstance(r, list) else [r])]
 
@@ -152,12 +164,12 @@ class Executor:
         shares: transient outputs have textures in common.
         """
         self._plan = None  # if an allocation fails, the next frame starts over
-        self._tenants = plan.tenants() if shares else {}
+        self.tenants = plan.tenants() if shares else {}
         keys = {
             (step.name, port, output.description, _size(output.description, size), type(step.work))
             for step in plan.steps
             for port, output in step.outputs.items()
-            if (step.name, port) not in self._tenants
+            if (step.name, port) not in self.tenants
         }
         for framebuffer in self._framebuffers:
             framebuffer.release()
@@ -170,7 +182,7 @@ class Executor:
             except DeviceError as error:
                 raise DeviceError(f"{key[0]}.{key[1]}: {error}") from error
         ports = {key[:2]: resource for key, resource in self._resources.items()}
-        ports |= {source: ports[home] for source, home in self._tenants.items()}
+        ports |= {source: ports[home] for source, home in self.tenants.items()}
         written = {(s.name, port): output.defines for s in plan.steps for port, output in s.outputs.items()}
         for step in plan.steps:
             inputs = {port: ports[source] if source else None for port, source in step.sources.items()}

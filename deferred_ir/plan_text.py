@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from . import savings
 from .graph import Graph, Plan
+from .scene import Scene
 
 
-def summary(plan: Plan) -> str:
-    """One block a step: what it reads, what it writes and how long that lives; then what was left out."""
+def summary(plan: Plan, scene: Scene | None = None) -> str:
+    """One block a step: what it reads, what it writes and how long that lives; then what was left out.
+
+    scene: whose frames the plan is for, to tell what its shaders do without.
+    """
     lines = []
     for number, step in enumerate(plan.steps):
         lines.append(f"{number + 1}. {step.name}" + (f"  ({kind})" if (kind := _kind(step.work, step.name)) else ""))
@@ -20,6 +25,8 @@ def summary(plan: Plan) -> str:
         lines += [f"     {line}" for line in _subpasses(plan, number)]
     lines.append("outputs: " + ", ".join(f"{name} = {'.'.join(source)}" for name, source in plan.outputs.items()))
     lines += [f"left out: {name}: {why}" for name, why in plan.left_out.items()]
+    if scene:
+        lines += [f"left out: {entry.what}: {entry.why}" for entry in savings.of_scene(scene)]
     return "\n".join(lines)
 
 

@@ -109,8 +109,18 @@ class Renderer:
             self._graphs[vpls] = config.load_graph(self._graph_name, self._set | count, self._passes)
         return self._graphs[vpls]
 
-    def plan(self, scene: Scene, vpls: int | None = None, outputs: Sequence[str] | None = None) -> Plan:
-        """What a frame of `scene` runs; `outputs` are all that the graph has unless some are named."""
+    def plan(
+        self,
+        scene: Scene,
+        vpls: int | None = None,
+        outputs: Sequence[str] | None = None,
+        *,
+        keep_all: bool | None = None,
+    ) -> Plan:
+        """What a frame of `scene` runs; `outputs` are all that the graph has unless some are named.
+
+        keep_all: with or without what the scene does not need; None: as the Renderer was made.
+        """
         if not isinstance(scene, Scene):
             raise SettingError(f"scene: is {type(scene).__name__}, not a Scene; load it first: deferred_ir.load(...)")
         graph = self.graph(vpls)
@@ -118,7 +128,7 @@ class Renderer:
             scene.facts,
             pixels=self.size[0] * self.size[1],
             software=self.gpu.device.kind == "software",
-            keep_all=self._keep_all,
+            keep_all=self._keep_all if keep_all is None else keep_all,
         )
         wanted = tuple(graph.outputs if outputs is None else outputs)
         key = (vpls, known, wanted)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import bias
+from . import bias, savings
 from .config import graph_hash
 from .graph import Graph, Plan
 from .image import write_whole
@@ -37,6 +38,10 @@ def run_record(
         step = next((step for step in plan.steps if step.name == entry["name"]), None)
         if step and (subpasses := step.work.subpasses(step.descriptions, renderer.executor.ports(step))):
             entry["subpasses"] = [dict(subpass) for subpass in subpasses]
+    memory, lost = renderer.memory(), _bias(renderer, scene, graph, plan)
+    left_out = [*savings.of_scene(scene), *savings.of_frames(renderer, plan, record)]
+    # Last, for it draws over what the frames have left.
+    left_out += savings.of_passes(renderer, scene, plan, seed=seed)
     return {
         "scene": scene.name,
         "scene_hash": scene.hash,
@@ -54,20 +59,10 @@ def run_record(
         "passes": passes,
         "maps_drawn": [counters.get("maps_drawn", 0) for counters in record.counters],
         "stand_in": _stand_in(last),
-        "left_out": _left_out(plan, record),
-        "bias": _bias(renderer, scene, graph, plan),
-        "memory_bytes": renderer.memory(),
+        "left_out": [asdict(entry) for entry in left_out],
+        "bias": lost,
+        "memory_bytes": memory,
     }
-
-
-def _left_out(plan: Plan, record: Record) -> list[dict[str, Any]]:
-    """What did not run, why, and what that saved in a frame where it is known."""
-    left_out = [{"what": name, "why": why, "ms": None, "bytes": None} for name, why in plan.left_out.items()]
-    frames = len(record.kept)
-    return left_out + [
-        {"what": name, "why": f"in {n} of {frames} frames nothing that it is made of changed", "ms": ms, "bytes": None}
-        for name, n, ms in record.reused()
-    ]
 
 
 def _stand_in(counters: Mapping[str, int]) -> dict[str, int] | None:

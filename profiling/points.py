@@ -13,6 +13,7 @@ from typing import Any
 from deferred_ir.errors import OutputError
 from deferred_ir.image import write_whole
 from deferred_ir.run_record import write
+from deferred_ir.savings import LeftOut
 
 FOLDER = "points"
 PICTURES = (".png", ".error.png")
@@ -57,7 +58,7 @@ class Point:
     frames: list[float]
     laps: list[list[tuple[str, float, float]]]
     memory: dict[str, int]
-    left_out: dict[str, str]
+    left_out: list[LeftOut]
     relmse: float
     relmse_untrimmed: float
     bias: float
@@ -88,9 +89,10 @@ def read(folder: Path, name: str) -> Point | None:
     try:
         data = json.loads(path(folder, name).read_text(encoding="utf-8"))
         laps = [[(str(label), float(gpu), float(cpu)) for label, gpu, cpu in frame] for frame in data["laps"]]
+        left_out = [LeftOut(**entry) for entry in data["left_out"]]
         if data.keys() != {f.name for f in fields(Point)} or not all(data["frames"]):
             return None
-        point = Point(**{**data, "key": Key(**data["key"]), "laps": laps})
+        point = Point(**{**data, "key": Key(**data["key"]), "laps": laps, "left_out": left_out})
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None  # it is measured again
     there = all(path(folder, name, suffix).is_file() for suffix in PICTURES)

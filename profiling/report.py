@@ -86,7 +86,7 @@ def _page(
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    left_out = {(point.graph, what): why for point in found for what, why in point.left_out.items()}
+    left_out = {(point.graph, entry.what): entry for point in found for entry in point.left_out}
     pictured = [point for point in found if point.pictures]
     pictures = [
         {
@@ -103,7 +103,7 @@ def _page(
         plot=plot[plot.index("<svg") :],  # without the XML header, which stands only at a file's beginning
         pictures=pictures,
         passes=tables.pass_rows(found),
-        left_out=[(graph, what, why) for (graph, what), why in left_out.items()],
+        left_out=[(graph, entry) for (graph, _), entry in left_out.items()],
         software=any(point.software for point in found),
         flip_notes=sorted({point.flip_note for point in found if point.flip_note}),
         noisy=sum(flagged(point) for point in found),

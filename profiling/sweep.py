@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from deferred_ir import difference
+from deferred_ir import difference, savings
 from deferred_ir.config import graph_hash, load_graph
 from deferred_ir.errors import GraphError, SettingError
 from deferred_ir.flip import FlipParameters
@@ -174,6 +174,9 @@ def _measure(
         image.save(display)
         errors = difference.signed_error(image.radiance, truth.radiance, result.reference_mean)
         difference.save(error, errors)
+    memory, alive = renderer.memory(), record.counters[-1].get("vpls_alive", 0)
+    left_out = savings.of_frames(renderer, plan, record)
+    left_out += savings.of_passes(renderer, scene, plan, vpls=key.vpls, seed=key.seed)
     point = Point(
         key=key,
         scene=scene.name,
@@ -182,11 +185,11 @@ def _measure(
         reference_noise=truth.noise,
         device=renderer.gpu.device.name,
         software=renderer.gpu.device.kind == "software",
-        vpls_alive=record.counters[-1].get("vpls_alive", 0),
+        vpls_alive=alive,
         frames=[round(ms, 4) for ms in record.frame_ms],
         laps=[[(name, round(gpu, 4), round(cpu, 4)) for name, (gpu, cpu) in laps.items()] for laps in record.laps],
-        memory=renderer.memory(),
-        left_out=dict(plan.left_out),
+        memory=memory,
+        left_out=left_out,
         relmse=result.relmse,
         relmse_untrimmed=result.relmse_untrimmed,
         bias=result.bias,

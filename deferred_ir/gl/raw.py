@@ -43,6 +43,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "GetError": (_U,),
     "GetIntegerv": (None, _U, _P),
     "GetQueryObjectui64v": (None, _U, _U, _P),
+    "GetTexLevelParameteriv": (None, _U, _I, _U, _P),
     "GetTexImage": (None, _U, _I, _U, _U, _P),
     **{f"Is{kind}": (ctypes.c_ubyte, _U) for kind in KINDS},
     "MemoryBarrier": (None, _U),
@@ -64,6 +65,9 @@ LOWER_LEFT, ZERO_TO_ONE = 0x8CA1, 0x935F
 TIMESTAMP, QUERY_RESULT = 0x8E28, 0x8866
 CLIP_DISTANCE0 = 0x3000
 MAX_TEXTURE_SIZE, MAX_ARRAY_LAYERS, MAX_VIEWPORT_DIMS = 0x0D33, 0x88FF, 0x0D3A
+TEXTURE_WIDTH, TEXTURE_HEIGHT, TEXTURE_DEPTH = 0x1000, 0x1001, 0x8071
+TEXTURE_BITS = 0x805C, 0x805D, 0x805E, 0x805F, 0x884A
+"""Of red, green, blue, alpha and depth."""
 READ_WRITE = 0x88BA
 TEXTURE_FETCH_BARRIER, IMAGE_ACCESS_BARRIER, TEXTURE_UPDATE_BARRIER, FRAMEBUFFER_BARRIER = 0x8, 0x20, 0x100, 0x400
 OUT_OF_MEMORY, CONTEXT_LOST = 0x0505, 0x0507

@@ -54,6 +54,8 @@ SCRATCH_UNIT = 31
 class GpuTexture:
     """A 2D texture or array of one level. `size` is (width, height), `layers` how many an array has now, else 0.
 
+    nbytes: what the driver has allocated for its texels.
+
     kept: what its writer notes about what it holds, for the frames that follow. version: another number whenever
     something was written into it, unlike that of any other texture or buffer.
     """
@@ -77,15 +79,24 @@ class GpuTexture:
         else:
             gl.TexStorage2D(self.target, 1, self.format.internal, *self.size)
         try:
-            gl.check(f"texture {self.description} of {self.nbytes / 2**20:.0f} MiB")
+            nominal = self.size[0] * self.size[1] * max(layers, 1) * self.format.bytes
+            gl.check(f"texture {self.description} of {nominal / 2**20:.0f} MiB")
         except DeviceError:
             self.release()
             raise
+        self.nbytes = self.measured()
 
-    @property
-    def nbytes(self) -> int:
-        """Its size."""
-        return self.size[0] * self.size[1] * max(self.layers, 1) * self.format.bytes
+    def measured(self) -> int:
+        """Its size by what the driver says that it has allocated, bytes."""
+        self._bind_to_work()
+
+        def asked(what: int) -> int:
+            value = ctypes.c_int()
+            self.gpu.gl.GetTexLevelParameteriv(self.target, 0, what, ctypes.byref(value))
+            return value.value
+
+        bits = sum(asked(what) for what in raw.TEXTURE_BITS)
+        return asked(raw.TEXTURE_WIDTH) * asked(raw.TEXTURE_HEIGHT) * asked(raw.TEXTURE_DEPTH) * bits // 8
 
     def fit(self, layers: int) -> bool:
         """Have `layers` layers, or up to twice as many if it has them; whether it was made anew for that.

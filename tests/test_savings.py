@@ -1,0 +1,78 @@
+"""What is said about what was left out: in RUN.json and in the report."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from small_scenes import room, smooth_scene
+from test_left_out import SIZE, gable
+
+from deferred_ir import savings
+from deferred_ir.gl.resources import FORMATS, GpuTexture
+from deferred_ir.graph import Texture
+from deferred_ir.timing import Record
+
+
+def told(renderer, scene, graph, outputs=None, **settings):
+    """Entries by what was left out, of two frames."""
+    one = renderer(SIZE, graph, set=settings)
+    plan, record = one.plan(scene, outputs=outputs), Record()
+    for _ in range(2):
+        one.draw(scene, plan, record=record)
+    one.finish(record)
+    before = one.memory()
+    entries = savings.of_frames(one, plan, record) + savings.of_passes(one, scene, plan)
+    return {entry.what: entry for entry in entries}, one.memory()["textures"] - before["textures"]
+
+
+def test_passes_that_another_output_needs_are_measured(renderer):
+    found, more = told(renderer, room(), "deferred", ["radiance"], **{"vpl.count": 4})
+    assert found["tonemap"].why == "no requested output needs it"
+    assert found["tonemap"].ms > 0
+    assert found["tonemap"].bytes == more == 4 * SIZE[0] * SIZE[1]
+
+
+def test_filters_without_vpls_are_measured_with_the_bytes_that_they_would_take(renderer):
+    found, more = told(renderer, room(), "interleaved", **{"vpl.count": 0})
+    assert {"interleave", "interleaved", "gather"} <= found.keys()
+    assert found["interleaved"].why.startswith("there are no VPLs")
+    assert all(found[name].ms >= 0 for name in ("interleaved", "gather"))
+    assert found["interleaved"].bytes == 16 * SIZE[0] * SIZE[1]
+    assert more >= found["interleaved"].bytes
+
+
+def test_what_is_a_choice_is_not_measured(renderer):
+    found, _ = told(renderer, room(), "accurate", **{"vpl.count": 4, "shadow_rays.visibility": "maps"})
+    assert found["shadow_rays"].ms is None
+    assert found["shadow_rays"].bytes is None
+
+
+def test_lights_layers_and_shared_textures_are_told(renderer):
+    sizes = {"shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 32, "vpl.count": 256}
+    found, _ = told(renderer, gable(), "interleaved", **sizes)
+    lights = next(entry for what, entry in found.items() if what.startswith("maps of "))
+    assert lights.why == "they light nothing that is seen"
+    assert found["lighting.radiance"].why.startswith("it has the texture of interleaved.shares")
+    assert found["lighting.radiance"].bytes == 16 * SIZE[0] * SIZE[1]
+    layers = found["shadow_maps.atlas"]
+    assert layers.why.endswith("of 65 layers are enough for the lights that live")
+    assert layers.bytes % (4 * 64 * 64) == 0
+
+
+def test_the_scene_tells_what_shaders_do_without():
+    def words(scene):
+        return {entry.what for entry in savings.of_scene(scene)}
+
+    assert words(room()) == {"vertex normals", "vertex colours", "textures", "soft shadows"}
+    assert words(smooth_scene()) == {"vertex colours", "textures", "soft shadows"}
+    disc = replace(room(), spotlight=replace(room().spotlight, radius=0.1))
+    assert "soft shadows" not in words(disc)
+
+
+@pytest.mark.parametrize("format", ["rgba32f", "rgba16f", "rgba16", "rgba8", "r32f", "rg32ui", "r32ui", "depth32f"])
+def test_memory_is_what_the_driver_says_of_each_format(gpu, format):
+    for layers in (0, 3):
+        texture = GpuTexture(gpu, Texture(format, layers=layers), (8, 4))
+        assert texture.nbytes == max(layers, 1) * 8 * 4 * FORMATS[format].bytes
+        texture.release()

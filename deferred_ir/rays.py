@@ -38,13 +38,16 @@ class _Body:
 
     def near(self, origins: Array, ways: Array, reach: Array) -> Ints:
         """Which of the rays meet its box within `reach` (n,) lengths of their directions, int (m,)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = 1 / ways
-            first, second = ((side - origins) * inverse for side in self.box.astype(np.float32))
-        # A ray in a side's plane gives 0 * inf: fmin and fmax pass over it.
-        enter = np.fmax(np.fmin(first, second), 0).max(axis=1)
-        leave = np.fmin(np.fmax(first, second), reach[:, None]).min(axis=1)
-        return np.flatnonzero(enter <= leave * (1 + SLACK))
+        enter, leave = np.zeros(len(origins), np.float32), reach
+        for axis, (low, high) in enumerate(self.box.T.astype(np.float32)):
+            origin = origins[:, axis]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                inverse = 1 / ways[:, axis]
+                first, second = (low - origin) * inverse, (high - origin) * inverse
+            # A ray in a side's plane gives 0 * inf: fmin and fmax pass over it.
+            enter = np.fmax(enter, np.fmin(first, second))
+            leave = np.fmin(leave, np.fmax(first, second))
+        return np.flatnonzero(enter <= leave * np.float32(1 + SLACK))
 
 
 class Rays:

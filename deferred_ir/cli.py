@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 from collections.abc import Sequence
@@ -10,6 +11,8 @@ from typing import Any, NoReturn
 
 from . import interrupts
 from .errors import Error, SettingError
+
+LATEST = 1e9
 
 SET_HELP = "a parameter of a pass, e.g. --set shadow_maps.vpl_size=512; may be repeated"
 
@@ -74,6 +77,7 @@ def _parser() -> Parser:
     kind.add_argument("--vpls", type=_positive, metavar="N", help="instead: N VPLs with perfect visibility")
     reference.add_argument("--bounces", type=_count, metavar="N", help="of indirect light (default: 1)")
     reference.add_argument("--seed", type=_count, default=0, metavar="N", help="of the samples (default: 0)")
+    reference.add_argument("--time", type=_seconds, default=0.0, metavar="T", help="of motions, seconds (default: 0)")
     reference.add_argument(
         "--set",
         action="append",
@@ -155,6 +159,12 @@ def _add_profile_options(profile: Parser) -> None:
     profile.add_argument("--seeds", type=_count, metavar="K", help="seeds 0 to K-1 (default: 3)")
     profile.add_argument("--size", metavar="WxH", help="pixels (default: 512x512)")
     profile.add_argument("--reference", metavar="R.npy", help="with R.json beside it (default: one is traced)")
+    profile.add_argument(
+        "--time",
+        type=_seconds,
+        metavar="T",
+        help="where something moves: the frames end at T seconds, where the reference is (default: 1)",
+    )
     profile.add_argument("--shard", metavar="I/N", help="measure the I-th of N parts only")
     profile.add_argument(
         "--peers",
@@ -194,6 +204,16 @@ def _add_view_options(view: Parser) -> None:
 
 def _count(text: str) -> int:
     return _whole(text, 0)
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = math.nan
+    if not abs(seconds) <= LATEST:
+        raise argparse.ArgumentTypeError(f"'{text}' is no number of seconds, such as 1.5")
+    return seconds
 
 
 def _positive(text: str) -> int:

@@ -26,6 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     image_record = read_record(image_path, (image.shape[1], image.shape[0]))
     reference_record = read_record(reference_path, (reference.shape[1], reference.shape[0]))
     _same_scene(image_path, image_record, reference_path, reference_record)
+    _same_time(image_path, image_record, reference_path, reference_record)
     hit = reference_record.get("hit_fraction") or None
     result = compare(image, reference, hit, names=(str(image_path), str(reference_path)))
     for note in _notes(result, image_path, image_record, reference_path, reference_record):
@@ -76,6 +77,16 @@ def _same_scene(image: Path, ours: dict[str, Any], reference: Path, theirs: dict
         names = [f"{shown(record.get('scene'))} ({shown(record['scene_hash'])})" for record in (ours, theirs)]
         raise SettingError(
             f"{image}: shows the scene {names[0]}, but {reference} shows {names[1]}; compare like with like"
+        )
+
+
+def _same_time(image: Path, ours: dict[str, Any], reference: Path, theirs: dict[str, Any]) -> None:
+    """Of scenes that move; records of still ones say 0. Those of other programs may say nothing."""
+    now, then = ours.get("time"), theirs.get("time")
+    if isinstance(now, int | float) and isinstance(then, int | float) and abs(now - then) > 1e-3:
+        raise SettingError(
+            f"{image}: shows the scene at {now:.4f} s, but {reference} shows it at {then:.4f} s; make that by: "
+            f"deferred-ir reference --time {now:.4f}"
         )
 
 

@@ -167,6 +167,10 @@ class Pass:
         """
         return FRAME_PARTS
 
+    def frames_to_fill(self) -> int:
+        """Frames of a still scene until what it keeps from frame to frame is complete: one, unless it says more."""
+        return 1
+
     def subpasses(
         self, inputs: Mapping[str, Description | None], ports: Mapping[str, Any] = NO_PORTS
     ) -> Sequence[Mapping[str, Any]]:
@@ -234,3 +238,8 @@ class Plan:
                     found[source] = home
             free += [found.get(source, source) for source in transient if self.lifetimes[source][1] == number]
         return found
+
+    @property
+    def frames_to_fill(self) -> int:
+        """Frames of a still scene until the picture is what it is to be; 1 where nothing is kept between frames."""
+        return max((step.work.frames_to_fill() for step in self.steps), default=1)

@@ -6,8 +6,8 @@ carries the light of its Voronoi cell, so all of the light is accounted for howe
 
 A ray that misses stands for its site, too: the light of its cell is lost, and the hole is not tried again.
 
-Where models move, VPLs on them and those that they hide from the light are given up. Maps that show a model where
-it was are drawn again within the budget, the oldest first.
+Where models move, VPLs that they hide from the light are given up. Those on them go with them: sites and validity at
+once, their light when there is budget for its map. Until then it shines from where it was.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 
 from .disc_cells import Cells, most_crowded
 from .emission_disc import EmissionDisc
+from .geometry import carried
 from .lights import Spotlight, frames
 from .sampling import disc as unit_disc
 from .stale_maps import StaleMaps
@@ -28,6 +29,10 @@ BETTER = 1.05
 """A site is moved if its nearest neighbour will be farther by this factor. Above 1, so that it comes to an end."""
 MARGIN = 0.9
 """New sites stay off the rim by this, over the root of their number: about half their distance from one another."""
+RESERVED = 8
+"""One map in so many is for VPLs that are there already, however many are new: a hole is worse than a map that lags."""
+FARTHEST = 0.1
+"""VPLs on moving models that shine from farther behind than this, in diagonals, are given up."""
 GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of the additive sequence in the unit square whose points keep apart best (Roberts 2018, R2)."""
 
@@ -53,18 +58,20 @@ class IncrementalVpls:
         self.version = np.zeros(count, np.int64)
         self.start = np.zeros((count, 2))
         self.direction, self.position, self.normal, self.shading_normal, self.albedo = np.zeros((5, count, 3))
+        # Of those on moving models, where they were when their maps were drawn: there they shine from.
+        self.shown, self.shown_normal = np.zeros((2, count, 3))
 
     def update(self, light: Spotlight, tracer: Tracer, *, least: int, most: int) -> Vpls:
         """The VPLs of the next frame, `ray` being their slots.
 
         light: where it is now. most: maps that may be drawn, of new sites or of those that show a model where it was;
-        half of it is the latter's if they need it. least: sites that may be new or moved to where they are of more
+        1 in RESERVED is the latter's if they need it. least: sites that may be new or moved to where they are of more
         use, as far as `most` goes.
         """
         self._turn(light)
         disc = EmissionDisc(light, self._axes(light))
         self._give_up(light, tracer, disc)
-        whole, most = most, most - min(most // 2, int(self._maps.stale.sum()))
+        whole, most = most, most - min(most // RESERVED, int(self._maps.stale.sum()))
         slots = np.flatnonzero(self.used)
         cells = Cells(disc.points(self.direction[slots]))
         free = np.flatnonzero(~self.used)[:most]
@@ -79,19 +86,39 @@ class IncrementalVpls:
         place = np.zeros((len(self.used), 2))
         place[slots] = cells.sites
         self._shoot(light, tracer, fresh, disc.directions(place[fresh]))
-        again = self._maps.oldest(np.flatnonzero(self._shines()), whole - len(fresh))
+        again = self._maps.chosen(self._lag(), whole - len(fresh))
         self.version[again] = new_versions(len(again))
-        self._maps.drawn(np.union1d(fresh, again))
+        drawn = np.union1d(fresh, again)
+        self._maps.drawn(drawn)
+        self.shown[drawn], self.shown_normal[drawn] = self.position[drawn], self.normal[drawn]
         self.at_rest = not len(fresh) and not self._maps.stale.any()
         return self._lit(light, disc.power)
 
+    @property
+    def waiting(self) -> int:
+        """Rays that the budget has not allowed so far."""
+        return int((~self.used).sum())
+
     def _give_up(self, light: Spotlight, tracer: Tracer, disc: EmissionDisc) -> None:
-        """Begin a frame: what the light does not reach any more, what lies on a model that has moved, stale maps."""
-        moved = self._maps.follow(tracer.scene.geometry)
-        self.used &= self._reached(light, tracer, disc) & ~np.append(False, moved)[self._group]
-        self._maps.stale = (self._maps.stale | self._maps.see(self.position, self.normal)) & self._shines()
+        """Begin a frame: VPLs go with their models; those that are not reached any more go, and maps become stale."""
+        geometry = tracer.scene.geometry
+        moves = self._maps.follow(geometry)
+        for number, move in moves.items():
+            own = np.flatnonzero(self.landed & (self._group == number + 1))
+            self.position[own] = carried(self.position[own], move)
+            for normals in (self.normal, self.shading_normal):
+                normals[own] = normals[own] @ move[:3, :3].T
+        self.used &= self._reached(light, tracer, disc) & (self._lag() <= FARTHEST * geometry.diagonal)
+        on_moved = np.isin(self._group, np.array(list(moves), int) + 1)
+        self._maps.stale |= on_moved | self._maps.see(self.shown, self.shown_normal)
+        self._maps.stale &= self._shines()
         if self._maps.see(np.array([light.position]), light.axis[None]).any():
             self._spot = None, 0
+
+    def _lag(self) -> Array:
+        """How far each VPL is from where it shines from, (count,)."""
+        lag: Array = np.linalg.norm(self.position - self.shown, axis=1) * (self._group > 0)
+        return lag
 
     def _shines(self) -> Bools:
         """Which slots have a VPL, and so a map."""
@@ -181,8 +208,9 @@ class IncrementalVpls:
         """What is there; each VPL carries the light of its cell."""
         slots = np.flatnonzero(self._shines())
         direction = self.direction[slots]
-        carried = np.multiply.outer(power * self.weights[slots], np.asarray(light.emission, float))
+        power_of_cells = np.multiply.outer(power * self.weights[slots], np.asarray(light.emission, float))
         arriving = np.maximum(-(self.shading_normal[slots] * direction).sum(axis=1), 0)
         crossing = -(self.normal[slots] * direction).sum(axis=1)
         ratio = np.divide(arriving, crossing, out=np.zeros(len(slots)), where=crossing > 0)
-        return Vpls(self.position[slots], self.normal[slots], carried * self.albedo[slots] * ratio[:, None], slots)
+        emission = power_of_cells * self.albedo[slots] * ratio[:, None]
+        return Vpls(self.shown[slots], self.shown_normal[slots], emission, slots)

@@ -17,6 +17,8 @@ from .options import chosen_size, notes
 ROOM = "deferred_ir.profiling"
 VPLS = "16,64,256"
 SEEDS = 3
+LAST = 1.0
+"""Seconds: the time of the last frame, and of the reference, where something moves."""
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -42,7 +44,8 @@ def _measured(arguments: argparse.Namespace, folder: Path) -> tuple[list[Any], A
     scene = load(arguments.scene)
     size = chosen_size(arguments.size, scene.render)
     seeds = SEEDS if arguments.seeds is None else arguments.seeds
-    what = sweep.Sweep(scene, size, graphs, counts, seeds, arguments.device, shard, peers)
+    time = LAST if arguments.time is None else arguments.time
+    what = sweep.Sweep(scene, size, graphs, counts, seeds, arguments.device, shard, peers, time if scene.moves else 0.0)
     for note in notes(scene):
         print(f"note: {note}", file=sys.stderr)
     found: tuple[list[Any], Any] = sweep.run(what, folder, Path(arguments.reference) if arguments.reference else None)
@@ -50,7 +53,7 @@ def _measured(arguments: argparse.Namespace, folder: Path) -> tuple[list[Any], A
 
 
 def _merged(arguments: argparse.Namespace, folder: Path) -> tuple[list[Any], Any]:
-    given = ("graphs", "vpls", "seeds", "size", "reference", "shard", "peers", "scene")
+    given = ("graphs", "vpls", "seeds", "size", "reference", "shard", "peers", "time", "scene")
     extra = [name for name in given if getattr(arguments, name) is not None]
     if extra:
         what = "a SCENE" if extra[0] == "scene" else f"--{extra[0]}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import time
+import time as clock
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -80,11 +80,12 @@ def reference(
     vpls: int | None = None,
     bounces: int = 1,
     seed: int = 0,
+    time: float = 0.0,
     settings: Mapping[str, Any] | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Reference:
-    """A ray-traced image of `scene` at time 0, of `size` (width, height).
+    """A ray-traced image of `scene` at `time` seconds, of `size` (width, height).
 
     spp: paths a pixel of the path tracer, 64 unless `vpls` is given: the number of VPLs, cast as in a render, with
     ray-cast visibility. bounces: of indirect light, 0 for direct light alone. settings: {"vpl.param": value} for
@@ -93,9 +94,10 @@ def reference(
     """
     settings = settings or {}
     _check(size, settings, spp=spp, vpls=vpls, bounces=bounces, seed=seed)
-    start = time.perf_counter()
+    start = clock.perf_counter()
     tell: dict[str, Any] = {"scene": scene.name, "scene_hash": scene.hash, "size": list(size), "bounces": bounces}
-    scene = scene.at(0.0).centred
+    tell["time"] = time if scene.moves else 0.0
+    scene = scene.at(time).centred
     paths = PathTracer(scene, Tracer(scene), bounces)
     if vpls is None:
         spp = DEFAULT_SPP if spp is None else spp
@@ -109,7 +111,7 @@ def reference(
     if broken:
         raise OutputError(f"{scene.path}: {broken} pixels of the reference are not finite; look for extreme numbers")
     tell["hit_fraction"] = float(made.hit.mean())
-    return replace(made, meta={**tell, **made.meta, "seconds": round(time.perf_counter() - start, 3)})
+    return replace(made, meta={**tell, **made.meta, "seconds": round(clock.perf_counter() - start, 3)})
 
 
 def _check(

@@ -40,6 +40,7 @@ def reference(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int
             vpls=arguments.vpls,
             bounces=_bounces(arguments.bounces, {**scene.render.set, **settings}),
             seed=arguments.seed,
+            time=arguments.time,
             settings={
                 **{name: value for name, value in usual.items() if name in references.SETTINGS},
                 **{name: value for name, value in settings.items() if name != BOUNCES},

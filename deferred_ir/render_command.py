@@ -71,6 +71,8 @@ def render(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
                 renderer, scene, str(graph_name), graph, plan, seed=seed, record=record, accumulated=picture.averaged
             )
             write(json, made)
+        for note in _unfilled(renderer, plan, arguments):
+            print(f"note: {note}", file=sys.stderr)
     if black:
         print("note: the picture is black: the camera sees nothing that is lit", file=sys.stderr)
     if outputs:
@@ -175,6 +177,24 @@ def _notes(scene: Scene, outputs: list[str], frames: int) -> Iterator[str]:
             if not _NUMBER.search(name):
                 path = Path(name)
                 yield f"{name} keeps the last of {frames} frames; {path.stem}_%04d{path.suffix} keeps all"
+
+
+def _unfilled(renderer: Renderer, plan: Plan, arguments: argparse.Namespace) -> Iterator[str]:
+    """What to say where passes that keep VPLs had no budget for all of them."""
+    count = getattr(renderer.graph().nodes["vpl"].work.params, "count", 0) if "vpl" in renderer.graph().nodes else 0
+    if arguments.accumulate > 1:
+        if plan.frames_to_fill > 1:
+            yield (
+                f"each of the {arguments.accumulate} frames that are averaged starts afresh, with few of {count} VPLs; "
+                f"--set vpl.most={count} gives them all"
+            )
+        return
+    counters = renderer.executor.counters
+    if counters.get("vpls_waiting"):
+        yield (
+            f"{count - counters['vpls_waiting']} of {count} rays for VPLs so far: {plan.frames_to_fill} frames fill "
+            f"the set where nothing moves, or --set vpl.most={count}"
+        )
 
 
 @contextmanager

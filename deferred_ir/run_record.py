@@ -12,6 +12,7 @@ from . import bias, savings
 from .config import graph_hash
 from .graph import Graph, Plan
 from .image import write_whole
+from .motion import FRAMES_PER_SECOND
 from .scene import Scene
 from .timing import Record
 
@@ -54,6 +55,7 @@ def run_record(
         "seed": seed,
         "device": renderer.gpu.device.name,
         "frames": len(record.frame_ms),
+        "time": (len(record.frame_ms) - 1) / FRAMES_PER_SECOND if scene.moves else 0.0,
         "accumulated": accumulated,
         "frame_ms": record.median_frame_ms(),
         "passes": passes,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from .geometry import Geometry
@@ -18,16 +20,16 @@ class StaleMaps:
         self._before: Geometry | None = None
         self._boxes: Array = np.zeros((0, 2, 3))
 
-    def follow(self, geometry: Geometry) -> Bools:
-        """Begin a frame: which of the moving models are elsewhere than in the last one, bool (m,)."""
+    def follow(self, geometry: Geometry) -> Mapping[int, Array]:
+        """Begin a frame: the rigid transforms (4, 4) of the moving models that are elsewhere than in the last one."""
         before, self._before = self._before, geometry
         self._frame += 1
+        self._boxes = self._boxes[:0]
         if before is None or before is geometry:
-            self._boxes = self._boxes[:0]
-            return np.zeros(len(geometry.moving), bool)
-        moved: Bools = (before.poses != geometry.poses).any(axis=(1, 2))
+            return {}
+        moved = np.flatnonzero((before.poses != geometry.poses).any(axis=(1, 2)))
         self._boxes = np.concatenate([before.boxes[moved], geometry.boxes[moved]])
-        return moved
+        return {number: geometry.poses[number] @ np.linalg.inv(before.poses[number]) for number in moved.tolist()}
 
     def see(self, positions: Array, axes: Array) -> Bools:
         """In front of which lights at `positions` along `axes` (n, 3) a model has moved in this frame, bool (n,)."""
@@ -42,7 +44,14 @@ class StaleMaps:
         self.stale[slots] = False
         self._drawn[slots] = self._frame
 
-    def oldest(self, slots: Ints, most: int) -> Ints:
-        """Up to `most` of the stale maps among `slots`, int (m,): those drawn longest ago."""
-        stale = slots[self.stale[slots]]
-        return stale[np.argsort(self._drawn[stale], kind="stable")[: max(most, 0)]]
+    def chosen(self, lag: Array, most: int) -> Ints:
+        """Up to `most` stale maps to draw, int (m,): half of them those that are most behind by `lag`, (slots,).
+
+        The rest are those drawn longest ago.
+        """
+        stale = np.flatnonzero(self.stale)
+        behind = stale[np.argsort(-lag[stale], kind="stable")]
+        first = behind[lag[behind] > 0][: (max(most, 0) + 1) // 2]
+        rest = np.setdiff1d(stale, first)
+        oldest = rest[np.argsort(self._drawn[rest], kind="stable")]
+        return np.concatenate([first, oldest[: max(most, 0) - len(first)]])

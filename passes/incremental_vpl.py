@@ -47,6 +47,11 @@ class IncrementalVpl(Pass):
         informed: Facts = self.params.informed(facts)
         return informed
 
+    def frames_to_fill(self) -> int:
+        """As many VPLs as there may be new ones in each."""
+        count, most = int(self.params.count), int(self.params.most)
+        return max(1, -(-count // max(most, 1)))
+
     def depends(self) -> frozenset[str]:
         """Where the light falls."""
         return frozenset({"light", "models", "seed"})
@@ -68,6 +73,7 @@ class IncrementalVpl(Pass):
         versions = np.append(state.spot_version(light), state.version[vpls.ray])
         lights.write(packed(frame.scene, vpls, p, vpls.ray), versions)
         io.state("vpls_alive", len(vpls))
+        io.state("vpls_waiting", state.waiting)
 
 
 PASS = IncrementalVpl

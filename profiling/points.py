@@ -22,13 +22,17 @@ PICTURES = (".png", ".error.png")
 
 @dataclass(frozen=True)
 class Key:
-    """What a point depends on. `scene_hash`, `graph_hash`: 16 hex digits; size: [width, height]."""
+    """What a point depends on. `scene_hash`, `graph_hash`: 16 hex digits; size: [width, height].
+
+    scene_hash: of the scene at the time of its image. motion: where something moves, the hash of the scene.
+    """
 
     scene_hash: str
     graph_hash: str
     size: list[int]
     vpls: int
     seed: int
+    motion: str = ""
 
     @property
     def name(self) -> str:
@@ -44,7 +48,8 @@ class Point:
     reference: hash of the reference image; reference_noise: its own relMSE, None where it is unknown. device:
     GL_RENDERER; software: it is a driver without a GPU. frames: wall time of each recorded frame. laps: for each frame
     (pass, GPU, CPU) in the order in which they ran. relmse_masked: of the pixels without an edge, None where there
-    is no such pixel. pictures: the files of PICTURES lie beside it.
+    is no such pixel. time: of the last frame, where something moves, seconds. pictures: the files of PICTURES lie
+    beside it.
     """
 
     key: Key
@@ -58,6 +63,7 @@ class Point:
     frames: list[float]
     laps: list[list[tuple[str, float, float]]]
     memory: dict[str, int]
+    time: float | None
     left_out: list[LeftOut]
     relmse: float
     relmse_untrimmed: float

@@ -47,6 +47,7 @@ def write_all(folder: Path, found: Sequence[Point], peers: Peers) -> str:
     about = {
         "scene": first.scene,
         "scene_hash": first.key.scene_hash,
+        "time": first.time,
         "size": first.key.size,
         "reference": {"hash": first.reference, "noise": first.reference_noise},
         "devices": sorted({point.device for point in found}),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,9 @@ from deferred_ir.config import graph_hash, load_graph
 from deferred_ir.errors import GraphError, SettingError
 from deferred_ir.flip import FlipParameters
 from deferred_ir.gl.gpu import Gpu
+from deferred_ir.graph import Plan
 from deferred_ir.metrics import compare, masked_relmse
+from deferred_ir.motion import FRAMES_PER_SECOND
 from deferred_ir.options import chosen_settings
 from deferred_ir.renderer import IMAGES, Renderer
 from deferred_ir.scene import Scene
@@ -37,7 +40,7 @@ OVERHEAD = 16
 class Sweep:
     """What is measured. size: (width, height). shard: (i, n), the i-th of n parts, from 1. peers: their names.
 
-    Peers belong to the first shard.
+    Peers belong to the first shard. time: seconds, where something moves: frames end there, and errors are of then.
     """
 
     scene: Scene
@@ -48,6 +51,7 @@ class Sweep:
     device: str = "auto"
     shard: tuple[int, int] = (1, 1)
     peers: Sequence[str] = ()
+    time: float = 0.0
 
     def __post_init__(self) -> None:
         for name, values in (("--graphs", self.graphs), ("--vpls", self.vpls), ("--seeds", range(self.seeds))):
@@ -65,6 +69,20 @@ class Sweep:
             total = len(self.graphs) * len(self.vpls) * self.seeds
             raise SettingError(f"--shard {self.shard[0]}/{self.shard[1]}: is empty, there are {total} points in all")
 
+    @cached_property
+    def moment(self) -> Scene:
+        """What errors are of: the scene at `time`, itself where nothing moves."""
+        return self.scene.at(self.time)
+
+    def frames(self, plan: Plan) -> list[float]:
+        """Times of the frames of a point: first those that do not count, then FRAMES that do, the last at `time`.
+
+        What passes keep from frame to frame is complete by then. Where models move it takes up to twice as long.
+        """
+        first = plan.frames_to_fill * (1 + self.scene.geometry.moves)
+        ahead = range(first + FRAMES - 1, -1, -1)
+        return [self.time - i / FRAMES_PER_SECOND if self.scene.moves else 0.0 for i in ahead]
+
     @property
     def settings(self) -> Mapping[str, Any]:
         """Parameters of passes from the scene file."""
@@ -73,7 +91,8 @@ class Sweep:
     def key(self, graph: str, vpls: int, seed: int) -> Key:
         """What the point depends on."""
         made = load_graph(graph, {**self.settings, "vpl.count": vpls})
-        return Key(self.scene.hash, graph_hash(made), list(self.size), vpls, seed)
+        motion = self.scene.hash if self.scene.moves else ""
+        return Key(self.moment.hash, graph_hash(made), list(self.size), vpls, seed, motion)
 
     def shares(self) -> list[tuple[str, int, int]]:
         """(graph, VPLs, seed) of the points of this shard."""
@@ -84,7 +103,7 @@ class Sweep:
 
 def run(sweep: Sweep, folder: Path, reference: Path | None) -> tuple[list[Point], Peers]:
     """Measure what is not in `folder` yet; all points of the sweep's shard."""
-    truth = sweep_reference.given(reference, sweep.scene, sweep.size) if reference else None
+    truth = sweep_reference.given(reference, sweep.scene, sweep.size, sweep.time) if reference else None
     gpu = Gpu(sweep.device)
     device = gpu.device.name
     gpu.close()
@@ -97,14 +116,14 @@ def run(sweep: Sweep, folder: Path, reference: Path | None) -> tuple[list[Point]
         with bars() as bar:
             truth = sweep_reference.made(
                 folder,
-                sweep.scene,
+                sweep.moment,
                 sweep.size,
                 deciding,
                 images=lambda: _probes(sweep),
                 progress=lambda spp: bar(f"reference, {spp} paths"),
             )
     with bars() as bar:
-        mask = edges.made(folder, sweep.scene, sweep.size, progress=lambda: bar("edges"))
+        mask = edges.made(folder, sweep.moment, sweep.size, progress=lambda: bar("edges"))
     done, ahead = dict[str, Point](), list[tuple[str, int, int]]()
     truth_hash = truth.hash
     for share in sweep.shares():
@@ -120,7 +139,7 @@ def run(sweep: Sweep, folder: Path, reference: Path | None) -> tuple[list[Point]
         done[point.key.name] = point
     peers = Peers()
     if sweep.peers and sweep.shard[0] == 1:
-        course = peer_sweep.Course(sweep.scene, sweep.size, sweep.seeds, truth, mask)
+        course = peer_sweep.Course(sweep.moment, sweep.size, sweep.seeds, truth, mask)
         peers = peer_sweep.run(course, folder, sweep.peers)
     return points.ordered(done.values()), peers
 
@@ -161,9 +180,9 @@ def _measure(
     images = [name for name in renderer.graph(key.vpls).outputs if name in IMAGES]
     plan = renderer.plan(scene, key.vpls, images)
     record = Record()
-    renderer.draw(scene, plan, seed=key.seed)  # compiles, allocates: not what a frame costs
-    for _ in range(FRAMES):
-        renderer.draw(scene, plan, seed=key.seed, record=record)
+    times = sweep.frames(plan)
+    for i, time in enumerate(times):  # the first compiles, allocates: not what a frame costs
+        renderer.draw(scene, plan, seed=key.seed, time=time, record=record if i >= len(times) - FRAMES else None)
     image = renderer.read(plan)
     renderer.finish(record)
     names = (f"{graph}, {key.vpls} VPLs, seed {key.seed}", "the reference")
@@ -190,6 +209,7 @@ def _measure(
         laps=[[(name, round(gpu, 4), round(cpu, 4)) for name, (gpu, cpu) in laps.items()] for laps in record.laps],
         memory=memory,
         left_out=left_out,
+        time=sweep.time if scene.moves else None,
         relmse=result.relmse,
         relmse_untrimmed=result.relmse_untrimmed,
         bias=result.bias,
@@ -209,6 +229,7 @@ def _probes(sweep: Sweep) -> list[Array]:
     for graph in sweep.graphs:
         with Renderer(sweep.size, graph, sweep.device, set=sweep.settings) as renderer:
             plan = renderer.plan(sweep.scene, max(sweep.vpls), ["radiance"])
-            renderer.draw(sweep.scene, plan)
+            for time in sweep.frames(plan):
+                renderer.draw(sweep.scene, plan, time=time)
             images.append(renderer.read(plan).radiance)
     return images

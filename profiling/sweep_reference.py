@@ -52,8 +52,8 @@ class Truth:
         return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
-def given(path: Path, scene: Scene, size: tuple[int, int]) -> Truth:
-    """The reference at `path`, held by its record against scene and size; SettingError if they differ."""
+def given(path: Path, scene: Scene, size: tuple[int, int], time: float = 0.0) -> Truth:
+    """The reference at `path`, held by its record against scene, size and time; SettingError if they differ."""
     radiance = read_radiance(path)
     height, width, _ = radiance.shape
     if (width, height) != size:
@@ -69,6 +69,11 @@ def given(path: Path, scene: Scene, size: tuple[int, int]) -> Truth:
         raise SettingError(
             f"{path}: shows the scene {record.get('scene')} ({record['scene_hash']}), but the sweep is of {scene.name} "
             f"({scene.hash}); make one by: deferred-ir reference"
+        )
+    if scene.moves and record.get("time") != time:
+        raise SettingError(
+            f"{path}: shows the scene at {record.get('time', 0.0)} s, but the sweep's frames end at {time} s; give "
+            f"--time {record.get('time', 0.0)}"
         )
     return Truth(radiance, record)
 

@@ -42,7 +42,8 @@ def run_record(
     memory, lost = renderer.memory(), _bias(renderer, scene, graph, plan)
     left_out = [*savings.of_scene(scene), *savings.of_frames(renderer, plan, record)]
     # Last, for it draws over what the frames have left.
-    left_out += savings.of_passes(renderer, scene, plan, seed=seed)
+    time = (len(record.frame_ms) - 1) / FRAMES_PER_SECOND if scene.moves else 0.0
+    left_out += savings.of_passes(renderer, scene.at(time), plan, seed=seed)
     return {
         "scene": scene.name,
         "scene_hash": scene.hash,
@@ -55,7 +56,7 @@ def run_record(
         "seed": seed,
         "device": renderer.gpu.device.name,
         "frames": len(record.frame_ms),
-        "time": (len(record.frame_ms) - 1) / FRAMES_PER_SECOND if scene.moves else 0.0,
+        "time": time,
         "accumulated": accumulated,
         "frame_ms": record.median_frame_ms(),
         "passes": passes,

@@ -195,7 +195,7 @@ def _measure(
         difference.save(error, errors)
     memory, alive = renderer.memory(), record.counters[-1].get("vpls_alive", 0)
     left_out = savings.of_frames(renderer, plan, record)
-    left_out += savings.of_passes(renderer, scene, plan, vpls=key.vpls, seed=key.seed)
+    left_out += savings.of_passes(renderer, sweep.moment, plan, vpls=key.vpls, seed=key.seed)
     point = Point(
         key=key,
         scene=scene.name,

@@ -47,8 +47,6 @@ class Interleaved(Pass):
         vpls, n = io["vpls"], int(io.defines["INTERLEAVE"])
         ctx, block = io.gpu.ctx, vpls.description.block
         program = io.program("interleaved.frag", defines=variants.of_pixels(frame, vpls.records))
-        io.framebuffer.clear_color()
-        ctx.enable(ctx.BLEND)
         ctx.blend_func = ctx.ONE, ctx.ONE
         starts = deal(len(vpls.records), n)[1].tolist()
         for share, rectangle in enumerate(sub_buffers(frame.size, n)):
@@ -62,6 +60,7 @@ class Interleaved(Pass):
                 if not begins and not count:
                     continue
                 first -= number * block
+                (ctx.disable if begins else ctx.enable)(ctx.BLEND)  # what begins a share writes all of its pixels
                 program.set(share=(share % n, share // n), begins=begins, first=first, end=first + count)
                 if io["rays"]:
                     program.set(before=number * block - start)

@@ -239,7 +239,7 @@ def test_what_is_saved_renders_to_the_same_pixels(viewer, tmp_path, monkeypatch,
     assert cli.main(again) == 0
     with Image.open(tmp_path / "cornell-1.png") as saved, Image.open(tmp_path / "again.png") as again:
         assert np.array_equal(np.asarray(saved), np.asarray(again))
-        assert np.array_equal(np.asarray(saved), viewer.session.image().display)
+        assert np.array_equal(np.asarray(saved), viewer.session.settled().display)
     assert (tmp_path / "cornell-1.exr").exists()
 
 

@@ -19,7 +19,7 @@ from ..camera import Camera
 from ..errors import Error, GraphError
 from ..exposure import automatic_stops
 from ..gl.devices import Loader
-from ..graph import Plan, Step
+from ..graph import Plan
 from ..image import Image
 from ..lights import Spotlight
 from ..loading import load
@@ -31,6 +31,7 @@ from ..timing import Record
 from .navigation import as_camera
 from .noise import Noise
 from .path import Path
+from .plans import changed, exposed
 
 FRAMES_KEPT = 240
 """Frame times that are kept for the plot."""
@@ -341,31 +342,3 @@ class Session:
     def close(self) -> None:
         """Give back what is on the device."""
         self.renderer.close()
-
-
-def changed(old: Plan, new: Plan) -> set[str]:
-    """Names of the steps of `new` whose results may differ from those that `old` left behind."""
-    before = {step.name: _identity(step) for step in old.steps}
-    found: set[str] = set()
-    for step in new.steps:
-        fed = any(source and source[0] in found for source in step.sources.values())
-        if fed or before.get(step.name) != _identity(step):
-            found.add(step.name)
-    return found
-
-
-def _identity(step: Step) -> tuple[Any, ...]:
-    return type(step.work), step.work.params, dict(step.sources), dict(step.outputs), dict(step.descriptions)
-
-
-def exposed(plan: Plan, stops: float) -> Plan:
-    """`plan` with `stops` wherever a pass's exposure is automatic; itself where none is."""
-    steps = [
-        replace(step, work=type(step.work)(replace(step.work.params, exposure=stops))) if _automatic(step) else step
-        for step in plan.steps
-    ]
-    return replace(plan, steps=tuple(steps)) if any(map(_automatic, plan.steps)) else plan
-
-
-def _automatic(step: Step) -> bool:
-    return getattr(step.work.params, "exposure", None) == "auto"

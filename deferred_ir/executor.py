@@ -144,7 +144,7 @@ class Executor:
         """Bytes of this executor's textures and buffers."""
         textures = sum(r.nbytes for r in self._all() if isinstance(r, GpuTexture))
         buffers = sum(r.nbytes for r in self._all() if isinstance(r, GpuBuffer))
-        return {"textures": textures, "buffers": buffers + self._frame_block.size}
+        return {"textures": textures, "buffers": buffers + self._frame_block.size + self.gpu.nbytes}
 
     def nbytes(self) -> dict[str, int]:
         """Bytes of the textures and buffers that each output of the last plan has to itself, and of each pass."""
@@ -174,6 +174,7 @@ class Executor:
         for framebuffer in self._framebuffers:
             framebuffer.release()
         self._framebuffers, self._ios = [], []
+        self.gpu.free_uniforms()
         for key in [key for key in self._resources if key not in keys]:
             _release(self._resources.pop(key))
         for key in sorted(keys - self._resources.keys(), key=lambda key: key[:2]):

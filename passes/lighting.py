@@ -9,12 +9,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+import numpy as np
+
 from deferred_ir import variants
 from deferred_ir.dropping import last_shining
 from deferred_ir.frame import Frame
+from deferred_ir.gl.shaders import Program
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
 from deferred_ir.io import Io
 from deferred_ir.lights import LIGHTS_PER_BLOCK
+from deferred_ir.screen_tiles import FEWEST, Tiles, draws
 
 
 class Lighting(Pass):
@@ -43,26 +47,45 @@ class Lighting(Pass):
         }
 
     def depends(self) -> frozenset[str]:
-        """Positions come back from the depth."""
-        return frozenset({"camera"})
+        """Positions come back from the depth, which the near plane scales."""
+        return frozenset({"camera", "models"})
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """One fullscreen draw a block of lights."""
+        """One fullscreen draw a block of lights, or one a tile of the screen with the lights that may reach it."""
         ctx, lights = io.gpu.ctx, io["lights"]
-        records = lights.records
-        defines = variants.of_pixels(frame, records[1:]) | variants.of_spotlight(frame, records)
+        records = lights.records[:1] if io["indirect"] else lights.records
+        defines = variants.of_pixels(frame, lights.records[1:]) | variants.of_spotlight(frame, records)
         program = io.program("lighting.frag", defines=defines)
         ctx.blend_func = ctx.ONE, ctx.ONE
-        total = 1 if io["indirect"] else len(records)
-        for start in range(0, total, LIGHTS_PER_BLOCK):
+        # A GPU would wait for the depth, and has a light's arithmetic for less than a draw.
+        if len(records) > FEWEST and io.gpu.device.kind == "software" and not frame.keep_all:
+            self._draw_tiles(frame, io, program, records)
+            return
+        for start in range(0, len(records), LIGHTS_PER_BLOCK):
             first = int(start == 0)
-            count = last_shining(records[start + first : min(start + LIGHTS_PER_BLOCK, total)])
+            count = last_shining(records[start + first : start + LIGHTS_PER_BLOCK])
             if not first and not count:
                 continue
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
             program.set(first=first, count=first + count)
             program.draw_fullscreen()
             ctx.enable(ctx.BLEND)
+
+    def _draw_tiles(self, frame: Frame, io: Io, program: Program, records: np.ndarray) -> None:
+        """The same light by light, without those that a tile lies behind."""
+        tiles = Tiles.of(io["depth"].read()[..., 0], frame.scene.camera, frame.near)
+        packed, made = draws(tiles, records)
+        buffer = io.gpu.uniforms(packed.tobytes())
+        io.framebuffer.clear_color()
+        size = LIGHTS_PER_BLOCK * records.itemsize
+        for draw in made:
+            buffer.bind_to_uniform_block(1, offset=draw.start * records.itemsize, size=size)
+            io.gpu.scissor(draw.rectangle)
+            if not draw.first:
+                io.gpu.ctx.enable(io.gpu.ctx.BLEND)
+            program.set(first=draw.first, count=draw.count)
+            program.draw_fullscreen()
+        io.count("lights_skipped", len(tiles.rectangles) * (len(records) - 1) - sum(d.count - d.first for d in made))
 
 
 PASS = Lighting

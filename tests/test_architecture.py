@@ -18,7 +18,7 @@ OPEN_TO_PASSES = {
     *("graph", "params", "gl", "camera", "lights", "tracing", "timing", "sampling", "errors", "typing"),
     *("frame", "io", "maps", "map_meshes", "paraboloid_maps", "vpls"),
     *("near_field", "surfaces", "resampling", "interleaving", "ray_visibility", "vpl_reference", "parallel"),
-    *("vpl_buffer", "dropping", "variants", "incremental", "kept_maps", "direct_light"),
+    *("vpl_buffer", "dropping", "variants", "screen_tiles", "incremental", "kept_maps", "direct_light"),
 }
 CLOSED_TO_PASSES = {"renderer", "executor", "config", "cli", "doctor", "viewer"}
 

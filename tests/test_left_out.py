@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from small_scenes import build, quad, room
+from small_scenes import build, crooked_room, plane, quad, room
 
 from deferred_ir import cli
 from deferred_ir.camera import Camera
@@ -16,6 +16,7 @@ from deferred_ir.gl.resources import GpuTexture
 from deferred_ir.graph import Input, Output, Texture
 from deferred_ir.io import FullscreenPass
 from deferred_ir.lights import Spotlight
+from deferred_ir.screen_tiles import Tiles
 
 SIZE = (48, 48)
 DARK = (0.0, 0.0, 0.0)
@@ -222,3 +223,21 @@ def test_the_command_line_can_keep_all(tmp_path):
     (slim, few, _), (full, more, _) = images
     assert np.array_equal(slim, full)
     assert [*few, "tonemap"] == more
+
+
+@pytest.mark.parametrize(("graph", "size", "vpls"), [("deferred", (150, 90), 40), ("hemisphere", (70, 130), 260)])
+def test_tiles_of_the_screen_skip_lights_that_they_lie_behind(renderer, graph, size, vpls):
+    scene = crooked_room()
+    settings = {"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}
+    (image, counters, _), (full, kept, _) = both(renderer, scene, graph, vpls=vpls, size=size, **settings)
+    assert counters["lights_skipped"] > 5
+    assert "lights_skipped" not in kept
+    assert same(image, full)
+
+
+def test_tiles_that_show_nothing_are_not_drawn(renderer):
+    scene = build(plane(), camera=Camera((0.0, 3.0, 0.1), (2.0, 0.0, 0.0), fov=70.0))
+    (image, _, _), (full, _, _) = both(renderer, scene, "deferred", vpls=16, size=(192, 192))
+    assert same(image, full)
+    camera = Tiles.of(np.where(np.arange(192) > 100, 0.5, 0.0)[None].repeat(192, axis=0), scene.camera, 0.1)
+    assert sorted(set(camera.rectangles[:, 0].tolist())) == [64, 128]

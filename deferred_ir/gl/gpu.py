@@ -30,6 +30,7 @@ class Gpu:
         if self.clip_control:
             self.gl.ClipControl(raw.LOWER_LEFT, raw.ZERO_TO_ONE)
         self._clipped = 0
+        self._uniforms: Any = None
         self._samplers: dict[tuple[bool, str | None, bool], Any] = {}
 
     @cached_property
@@ -64,8 +65,36 @@ class Gpu:
         ctx = self.ctx
         ctx.disable(ctx.DEPTH_TEST | ctx.CULL_FACE | ctx.BLEND)
         self.clip(0)
+        self.scissor(None)
         self.gl.DepthMask(1)
         self.gl.ColorMask(1, 1, 1, 1)
+
+    def scissor(self, rectangle: tuple[int, int, int, int] | None) -> None:
+        """Draw into x, y, width, height alone, or everywhere again."""
+        if rectangle is None:
+            self.ctx.disable_direct(raw.SCISSOR_TEST)
+        else:
+            self.ctx.enable_direct(raw.SCISSOR_TEST)
+            self.gl.Scissor(*rectangle)
+
+    def uniforms(self, data: bytes) -> Any:
+        """A buffer that begins with `data`, until the next call; `free_uniforms` gives it back."""
+        if self._uniforms is None:
+            self._uniforms = self.ctx.buffer(reserve=len(data), dynamic=True)
+        self._uniforms.orphan(max(len(data), self._uniforms.size))
+        self._uniforms.write(data)
+        return self._uniforms
+
+    def free_uniforms(self) -> None:
+        """Give that buffer back, if there is one."""
+        if self._uniforms is not None:
+            self._uniforms.release()
+            self._uniforms = None
+
+    @property
+    def nbytes(self) -> int:
+        """Of that buffer."""
+        return self._uniforms.size if self._uniforms else 0
 
     def barrier(self) -> None:
         """Let later draws, uploads and reads see what shaders stored into images so far."""
@@ -90,6 +119,7 @@ class Gpu:
         with self.ctx:  # names mean something else in whichever context is current
             for sampler in self._samplers.values():
                 sampler.release()
+            self.free_uniforms()
             if debug:
                 debug.close()
         if self._headless:

@@ -50,6 +50,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "PixelStorei": (None, _U, _I),
     "QueryCounter": (None, _U, _U),
     "ReadPixels": (None, _I, _I, _I, _I, _U, _U, _P),
+    "Scissor": (None, _I, _I, _I, _I),
     "TexStorage2D": (None, _U, _I, _U, _I, _I),
     "TexStorage3D": (None, _U, _I, _U, _I, _I, _I),
     "TexSubImage2D": (None, _U, _I, _I, _I, _I, _I, _U, _U, _P),
@@ -63,7 +64,7 @@ COLOR, DEPTH = 0x1800, 0x1801
 COLOR_ATTACHMENT0, DEPTH_ATTACHMENT = 0x8CE0, 0x8D00
 LOWER_LEFT, ZERO_TO_ONE = 0x8CA1, 0x935F
 TIMESTAMP, QUERY_RESULT = 0x8E28, 0x8866
-CLIP_DISTANCE0 = 0x3000
+CLIP_DISTANCE0, SCISSOR_TEST = 0x3000, 0x0C11
 MAX_TEXTURE_SIZE, MAX_ARRAY_LAYERS, MAX_VIEWPORT_DIMS = 0x0D33, 0x88FF, 0x0D3A
 TEXTURE_WIDTH, TEXTURE_HEIGHT, TEXTURE_DEPTH = 0x1000, 0x1001, 0x8071
 TEXTURE_BITS = 0x805C, 0x805D, 0x805E, 0x805F, 0x884A

@@ -1,12 +1,14 @@
 """Finds passes that read what no pass has written: their outputs change with what memory held before.
 
-Two frames are drawn, each with all outputs filled beforehand: once with NaN, once with a number that means something
-else. A texel that is still the filling was never written, which is fine while nobody reads it. One that differs between
-the two frames, but is not the filling, was made of such a texel.
+Two frames are drawn, each with all outputs filled beforehand: once with NaN, once with numbers. A texel that is still
+the filling was never written, which is fine while nobody reads it. One that differs between the two frames, but is not
+the filling, was made of such a texel.
 """
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,8 +21,9 @@ from .scene import Scene
 if TYPE_CHECKING:
     from .renderer import Renderer
 
-FILLINGS = 0xFF, 0x55
-"""Bytes. Floats of them are NaN and 1.5e13 (half: 85), whole numbers large ones."""
+NAN = (0xFF,)
+NUMBERS = tuple(range(0x3F, 0x2F, -1))
+"""Bytes. Floats of 0x3F are 0.75 (half: 1.8), of those below smaller; no texture's filling is that of the next."""
 
 Texels = dict[tuple[str, str, int], np.ndarray]
 
@@ -31,8 +34,9 @@ def unwritten_reads(renderer: Renderer, scene: Scene, plan: Plan, *, seed: int =
     What passes keep from frame to frame is dropped before and after.
     """
     empty, drawn = [], []
-    for byte in FILLINGS:
-        watch = _Watch(byte)
+    renderer.draw(scene, plan, seed=seed)  # gives textures that grow with what is drawn their size
+    for fillings in (NAN, NUMBERS):
+        watch = _Watch(fillings)
         renderer.reset()
         renderer.executor.watch = watch
         try:
@@ -60,15 +64,15 @@ def _bits(texels: np.ndarray) -> np.ndarray:
 class _Watch:
     """Fills outputs before their pass runs, and reads them after it."""
 
-    def __init__(self, byte: int) -> None:
-        self.byte = byte
+    def __init__(self, fillings: Sequence[int]) -> None:
+        self._fillings = itertools.cycle(fillings)
         self.before: Texels = {}
         self.after: Texels = {}
 
     def begin(self, step: Step, io: Io) -> None:
         """Before the pass."""
         for key, texture in _textures(step, io):
-            texture.fill(self.byte)
+            texture.fill(next(self._fillings))
             self.before[key] = texture.read()
 
     def end(self, step: Step, io: Io) -> None:

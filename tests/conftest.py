@@ -74,6 +74,7 @@ def screen() -> Iterator[str]:
 @pytest.fixture(scope="session")
 def viewer_window(screen: str) -> Iterator[Any]:
     """One window for all tests; at the end it is closed while a reference is traced."""
+    import glfw
     from virtual_display import FEW, SIZE, close_renderer, cornell, xdo
 
     from deferred_ir.gl.window import Window
@@ -86,10 +87,12 @@ def viewer_window(screen: str) -> Iterator[Any]:
     viewer = Viewer(window, Session(cornell(), SIZE, window, settings=FEW))
     viewer.frame()
     xdo("search", "--sync", "--name", "deferred-ir test", "windowfocus", "--sync")
+    glfw.make_context_current(None)  # else contexts of other tests would never become current
     yield viewer
-    viewer.panel.truth.start()
-    viewer.frame()
-    viewer.close()
+    with window:
+        viewer.panel.truth.start()
+        viewer.frame()
+        viewer.close()
     assert not viewer.panel.truth.truth.running
     close_renderer()
 
@@ -100,7 +103,8 @@ def viewer(viewer_window: Any) -> Iterator[Any]:
     from virtual_display import restore
 
     shared, session = viewer_window, viewer_window.session
-    restore(shared)
-    yield shared
+    with shared.window:
+        restore(shared)
+        yield shared
     with session.renderer.gpu.ctx:
         assert session.renderer.gpu.ctx.error == "GL_NO_ERROR"

@@ -48,4 +48,4 @@ def test_a_target_that_is_not_cleared_is_found(renderer, monkeypatch):
 
 def test_blending_onto_what_is_there_is_found(renderer, monkeypatch):
     monkeypatch.setattr(Framebuffer, "clear_color", lambda self, index=0: None)
-    assert found(renderer, "interleaved", OPEN)[0] == "interleaved.shares"
+    assert "lighting.radiance" in found(renderer, "deferred", OPEN)

@@ -14,6 +14,8 @@ SWITCH = "DEFERRED_IR_DEBUG"
 """Environment variable: anything in it turns debug output on."""
 _HERE = Path(__file__).resolve().parent.parent
 _OUTSIDE = ("moderngl", "glcontext")
+_CALLBACKS: list[Any] = []
+"""OpenGL calls them as long as their contexts live, and a window's outlives all that is known of it here."""
 
 
 class DebugOutput:
@@ -21,11 +23,11 @@ class DebugOutput:
 
     def __init__(self, ctx: Any, gl: raw.GL) -> None:
         self.faults: list[str] = []
-        self._gl = gl
-        self._callback = gl.debug_callback(self._heard)  # OpenGL calls it until it is given another
+        callback = gl.debug_callback(self._heard)
+        _CALLBACKS.append(callback)
         ctx.enable_direct(raw.DEBUG_OUTPUT)
         ctx.enable_direct(raw.DEBUG_OUTPUT_SYNCHRONOUS)  # inside the call that is at fault
-        gl.DebugMessageCallback(self._callback, None)
+        gl.DebugMessageCallback(callback, None)
 
     def _heard(self, source: int, kind: int, *rest: Any) -> None:
         _number, _severity, _length, text, _user = rest
@@ -39,10 +41,6 @@ class DebugOutput:
             told = "; ".join(self.faults)
             self.faults.clear()
             raise DeviceError(f"{where}: {told}")
-
-    def close(self) -> None:
-        """Hear no more."""
-        self._gl.DebugMessageCallback(None, None)
 
 
 def _caller() -> str:

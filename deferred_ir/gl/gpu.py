@@ -115,16 +115,12 @@ class Gpu:
 
     def close(self) -> None:
         """Destroy the context and all that lives in it; a window's own is left to the window."""
-        debug, self.gl.debug = self.gl.debug, None
         with self.ctx:  # names mean something else in whichever context is current
             for sampler in self._samplers.values():
                 sampler.release()
             self.free_uniforms()
-            if debug:
-                debug.close()
         if self._headless:
             devices.close(self.ctx, self._loader)
         else:
             self.ctx.release()
-        if debug:
-            debug.check("closing")
+        self.check("closing")

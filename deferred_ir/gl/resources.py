@@ -161,7 +161,7 @@ class GpuTexture:
         self.touch()
         # As floats they would be rounded to what fits; whole numbers of the stored width go in as they are.
         texel = (ctypes.c_ubyte * 16)(*[byte] * 16)
-        where = (0, 0, 0, 0, *self.size, max(self.description.layers, 1))
+        where = (0, 0, 0, 0, *self.size, max(self.layers, 1))
         self.gpu.gl.ClearTexSubImage(self.glo, *where, self.format.layout, self.format.type, texel)
 
     def clear_part(self, layer: int, corner: tuple[int, int], edge: int) -> None:

@@ -48,4 +48,4 @@ def test_a_target_that_is_not_cleared_is_found(renderer, monkeypatch):
 
 def test_blending_onto_what_is_there_is_found(renderer, monkeypatch):
     monkeypatch.setattr(Framebuffer, "clear_color", lambda self, index=0: None)
-    assert "lighting.radiance" in found(renderer, "deferred", OPEN)
+    assert "forward.radiance" in found(renderer, "forward", OPEN)

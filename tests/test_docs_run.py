@@ -72,6 +72,20 @@ def test_the_scene_file_of_the_page_renders(tmp_path, monkeypatch):
     assert (tmp_path / "box.png").is_file()
 
 
+def test_the_moving_scene_of_the_page_moves(tmp_path, monkeypatch):
+    wanted = ("moving.toml", "cube.obj")
+    blocks = [block for block in pages.blocks(pages.ROOT / "docs" / "scene-file.md") if block.file in wanted]
+    assert len(blocks) == 2
+    for block in blocks:
+        (tmp_path / block.file).write_text(block.text, encoding="utf-8")
+    for model in ("cornell.obj", "cornell.mtl"):
+        shutil.copy(pages.ROOT / "scenes" / model, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    command = ["render", "moving.toml", "--size", "32x32", "--vpls", "1", "--device", "software", "--frames", "4"]
+    assert cli.main([*command, "-o", "f_%04d.png"]) == 0
+    assert (tmp_path / "f_0000.png").read_bytes() != (tmp_path / "f_0003.png").read_bytes()
+
+
 def test_every_picture_of_the_docs_is_shown_and_every_shown_one_is_there():
     there = {path.name for path in (pages.ROOT / pages.PICTURES).iterdir()}
     assert {Path(link).name for link in LINKED} == there

@@ -46,7 +46,7 @@ def start(tracer: Tracer, record: Any) -> np.ndarray:
 
 def depths(tracer: Tracer, record: Any, way: np.ndarray, projection: str) -> np.ndarray:
     """Depth of what rays along `way` (..., 3) from the light meet, 0 where they miss."""
-    near = NEAR * tracer.scene.geometry.diagonal
+    near = NEAR * tracer.scene.geometry.scale
     z, position = record["z_axis"].astype(float), record["position"].astype(float)
     rays = way.reshape(-1, 3)
     hits = tracer.closest(np.broadcast_to(start(tracer, record), rays.shape), rays)

@@ -13,7 +13,6 @@ from deferred_ir import cli
 from deferred_ir.exposure import automatic_stops
 from deferred_ir.lights import LIGHT
 from deferred_ir.loading import load
-from deferred_ir.renderer import Renderer
 from deferred_ir.viewer import frames as local_frames
 from deferred_ir.viewer import panel as panels
 
@@ -271,30 +270,6 @@ def test_a_recorded_way_is_saved_and_plays(viewer, tmp_path, monkeypatch):
     session.playing = True
     frames(viewer, 3)
     assert session.spotlight != start
-
-
-def test_moving_models_play_and_are_saved_where_they_are(viewer, tmp_path, monkeypatch):
-    monkeypatch.setattr(panels, "FOLDER", tmp_path)
-    source = load("cornell").path.with_name("cornell.obj")
-    still = f'[[model]]\npath = "{source}"\nscale = 0.001\n'
-    moving = f'[[model]]\npath = "{source}"\nscale = 0.0003\n[model.motion]\ntimes = [0, 1]\n'
-    moving += "translations = [[0.1, 0.1, 0], [0.4, 0.3, 0]]\nrotations = [[0, 0, 0, 1], [0, 0.6, 0, 0.8]]\n"
-    (tmp_path / "moving.toml").write_text(still + moving)
-    session = viewer.session
-    session.open(str(tmp_path / "moving.toml"))
-    session.change("deferred", FEW)
-    frames(viewer)
-    first = session.image().radiance
-    session.playing = True
-    frames(viewer, 6)
-    session.playing = False
-    frames(viewer)
-    now = session.image().radiance
-    assert not np.array_equal(now, first)
-    act(viewer, "key", "ctrl+s")
-    (saved,) = (path for path in tmp_path.glob("moving-*.toml"))
-    with Renderer(session.size, "deferred", "software", set=FEW) as renderer:
-        assert np.abs(renderer.render(load(saved)).radiance - now).max() < 1e-3 * now.max()
 
 
 def test_shaders_and_graphs_are_read_again_and_a_broken_edit_keeps_the_picture(viewer, tmp_path, monkeypatch):

@@ -28,7 +28,8 @@ class Client:
         for name in ("XOpenDisplay", "XDefaultRootWindow", "XCreateSimpleWindow", "XInternAtom"):
             getattr(x, name).restype = ctypes.c_void_p
         self._display = ctypes.c_void_p(x.XOpenDisplay(None))
-        root = ctypes.c_ulong(x.XDefaultRootWindow(self._display))
+        self._root = x.XDefaultRootWindow(self._display)
+        root = ctypes.c_ulong(self._root)
         zero = ctypes.c_ulong(0)
         self._window = x.XCreateSimpleWindow(self._display, root, 0, 0, 1, 1, 0, zero, zero)
 
@@ -102,6 +103,12 @@ class Client:
     def _state(self, window: int, state: int) -> None:
         name = self._atom("WM_STATE")
         self._change(window, name, name, (ctypes.c_long * 2)(state, 0))
+
+    def scale(self, factor: float) -> None:
+        """Tell programs that start while this client is there how large text is to be: 1 at 96 dots an inch."""
+        data = f"Xft.dpi:\t{round(96 * factor)}\n".encode()
+        self._change(self._root, self._atom("RESOURCE_MANAGER"), self._atom("STRING"), data)
+        self._x.XSync(self._display, 0)
 
     def close(self, window: int) -> None:
         """Press its cross."""

@@ -1,4 +1,7 @@
-"""Takes a screenshot of the viewer on a virtual display: `python tools/viewer_picture.py OUT.png`."""
+"""Takes a screenshot of the viewer on a virtual display: `python tools/viewer_picture.py OUT.png [SCALE]`.
+
+SCALE: how large the desktop wants text, 1 at 96 dots an inch.
+"""
 
 from __future__ import annotations
 
@@ -8,23 +11,23 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from virtual_display import act, display, xdo
+from x_client import Client
 
-SIZE = 900, 720
-"""Of the picture: with the panel it is 1280x720."""
+WINDOW = 1280, 720
 
 
-def main(target: str) -> int:
+def main(target: str, scale: str = "1") -> int:
     """The Cornell box with local frames and the shadow map, by the keys that a user would press."""
     from deferred_ir.gl.window import Window
     from deferred_ir.image import Image
     from deferred_ir.loading import load
     from deferred_ir.viewer.app import Viewer
-    from deferred_ir.viewer.panel import WIDTH
     from deferred_ir.viewer.session import Session
 
-    with display():
-        window = Window("deferred-ir", (SIZE[0] + WIDTH, SIZE[1]))
-        viewer = Viewer(window, Session(load("cornell"), SIZE, window))
+    with display(), Client() as desktop:
+        desktop.scale(float(scale))
+        window = Window("deferred-ir", WINDOW)
+        viewer = Viewer(window, Session(load("cornell"), WINDOW, window))
         try:
             viewer.frame()
             xdo("search", "--sync", "--name", "deferred-ir", "windowfocus", "--sync")
@@ -42,4 +45,4 @@ def main(target: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    sys.exit(main(*sys.argv[1:]))

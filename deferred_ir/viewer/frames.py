@@ -40,8 +40,8 @@ def project(points: Array, session: Session) -> tuple[Array, Array]:
     return np.stack([(x + 1) / 2 * width, (1 - y) / 2 * height], axis=-1), front
 
 
-def draw(imgui: Any, session: Session, area: Area, window_height: int) -> None:
-    """Draw all frames over the picture in `area`."""
+def draw(imgui: Any, session: Session, area: Area, window_height: int, covered: int = 0) -> None:
+    """Draw all frames over the picture in `area`, but over a square of `covered` pixels in its lower left corner."""
     lights = records(session)
     if lights is None:
         return
@@ -61,9 +61,10 @@ def draw(imgui: Any, session: Session, area: Area, window_height: int) -> None:
     shift = np.array([area.x, window_height - area.y - area.height])
     lines = imgui.get_background_draw_list()
     lines.push_clip_rect(imgui.ImVec2(*shift), imgui.ImVec2(shift[0] + area.width, shift[1] + area.height))
-    for i in range(len(lights)):
+    free = (start[:, 0] > covered) | (start[:, 1] < session.size[1] - covered)
+    for i in np.flatnonzero(start_seen & free):
         for axis, color in enumerate(COLORS):
-            if start_seen[i] and end_seen[i, axis]:
+            if end_seen[i, axis]:
                 packed = imgui.get_color_u32(imgui.ImVec4(*color, DIM if hidden[i] else 1.0))
                 a, b = start[i] + shift, end[i, axis] + shift
                 lines.add_line(imgui.ImVec2(*a), imgui.ImVec2(*b), packed, 3.0 if i == 0 else 1.5)

@@ -69,6 +69,11 @@ class MapsPanel:
         tiles = sorted(lights["tile"][shining(lights)].astype(int).tolist())
         return [Map(f"vpl {tile}" if tile >= 0 else "spotlight", "", textures[tile + 1]) for tile in tiles]
 
+    def edge(self, area: Area) -> int:
+        """Pixels that the map covers in both directions, 0 where none is shown."""
+        shown = self._controls.switches["map"] and self._maps()
+        return max(round(SHARE * min(area.width, area.height)), 1) if shown else 0
+
     def draw(self) -> None:
         """The switch and its sliders."""
         imgui, switches = self._imgui, self._controls.switches
@@ -94,7 +99,7 @@ class MapsPanel:
         if not maps:
             return
         chosen = maps[min(self.light, len(maps) - 1)]
-        edge = max(round(SHARE * min(area.width, area.height)), 1)
+        edge = self.edge(area)
         corner = Area(area.x, area.y, edge, edge)
         gain = self.intensity * (1.0 if self.linear else 0.3)
         canvas.show(chosen.texture, corner, layer=chosen.layer, part=chosen.part, gain=gain, linear=self.linear)

@@ -60,7 +60,7 @@ class Panel:
         """All controls of this frame, and what lies over the picture in `area`."""
         imgui, (width, height) = self._imgui, self._window.size
         if self._controls.switches["frames"]:
-            frames.draw(imgui, self._session, area, height)
+            frames.draw(imgui, self._session, area, height, self.maps.edge(area))
         if self.width == 0 or height == 0:
             return
         imgui.set_next_window_pos(imgui.ImVec2(width - self.width, 0))

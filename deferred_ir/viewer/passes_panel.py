@@ -53,14 +53,14 @@ class PassesPanel:
     def _line(self, name: str, times: tuple[str, str]) -> None:
         imgui = self._imgui
         imgui.text(name)
-        right, width = imgui.get_content_region_avail().x, imgui.calc_text_size("000000 ").x
+        right, width = imgui.get_content_region_avail().x, imgui.calc_text_size("0000.00 ").x
         for place, text in zip((2, 1), times, strict=True):
             imgui.same_line(right - place * width)
             imgui.text(text)
 
     def _row(self, step: Step) -> None:
         imgui, laps, kept = self._imgui, self._session.laps.get(step.name), step.name in self._session.kept
-        times = (f"{laps[0]:.4g}", f"{laps[1]:.4g}") if laps else ("-", "-")
+        times = (f"{laps[0]:.2f}", f"{laps[1]:.2f}") if laps else ("-", "-")
         if kept:
             imgui.push_style_color(imgui.Col_.text, imgui.get_style_color_vec4(imgui.Col_.text_disabled))
         self._line(f"{step.name}: kept" if kept else step.name, times)
@@ -83,7 +83,7 @@ class PassesPanel:
 
     def _left_out(self, name: str, why: str) -> None:
         imgui, laps = self._imgui, self._session.laps.get(name)
-        saved = f"; that saves about {max(laps):.4g} ms" if laps else ""
+        saved = f"; that saves about {max(laps):.2f} ms" if laps else ""
         imgui.push_text_wrap_pos(0.0)
         imgui.text_disabled(f"{name}: left out: {why}{saved}")
         imgui.pop_text_wrap_pos()

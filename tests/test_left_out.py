@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from small_scenes import build, crooked_room, plane, quad, room
+from test_moving_models import two
 
 from deferred_ir import cli
 from deferred_ir.camera import Camera
@@ -241,3 +242,11 @@ def test_tiles_that_show_nothing_are_not_drawn(renderer):
     assert same(image, full)
     camera = Tiles.of(np.where(np.arange(192) > 100, 0.5, 0.0)[None].repeat(192, axis=0), scene.camera, 0.1)
     assert sorted(set(camera.rectangles[:, 0].tolist())) == [64, 128]
+
+
+@pytest.mark.parametrize("graph", ["deferred", "interleaved"])
+def test_nothing_is_missing_when_models_move(renderer, graph):
+    scene, ways = two(), [renderer((96, 70), graph, keep_all=keep_all) for keep_all in (False, True)]
+    for time in (0.0, 0.7, 0.2):
+        images = [one.render(scene, vpls=24, time=time) for one in ways]
+        assert same(*images)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 from small_scenes import room, smooth_scene
@@ -11,6 +12,7 @@ from test_left_out import SIZE, gable
 from deferred_ir import savings
 from deferred_ir.gl.resources import FORMATS, GpuTexture
 from deferred_ir.graph import Texture
+from deferred_ir.profiling import left_out
 from deferred_ir.timing import Record
 
 
@@ -76,3 +78,18 @@ def test_memory_is_what_the_driver_says_of_each_format(gpu, format):
         texture = GpuTexture(gpu, Texture(format, layers=layers), (8, 4))
         assert texture.nbytes == max(layers, 1) * 8 * 4 * FORMATS[format].bytes
         texture.release()
+
+
+def test_the_table_holds_both_ways_together(monkeypatch, capsys):
+    started = []
+    monkeypatch.setattr(left_out, "seconds", lambda command: started.append("--keep-all" in command) or 1.0)
+    monkeypatch.setattr(left_out, "row", partial(left_out.row, size=(32, 24)))
+    monkeypatch.setattr("sys.argv", ["left_out", "cornell", "--vpls", "4", "--turns", "1", "--device", "software"])
+    left_out.main()
+    head, _, *rows = capsys.readouterr().out.splitlines()
+    assert head.startswith("| scene | graph | frame [ms] | all kept |")
+    for graph, line in zip(("deferred", "interleaved"), rows, strict=True):
+        assert line.startswith(f"| cornell | {graph} |")
+        few, more = (float(cell) for cell in line.strip(" |").split(" | ")[-2:])
+        assert 16 < few <= more
+    assert started == [False, True] * 2

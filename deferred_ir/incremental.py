@@ -156,7 +156,9 @@ class IncrementalVpls:
         reached[chosen] &= (self.direction[chosen] * self.normal[chosen]).sum(axis=1) < 0
         reached[chosen] &= distance > tracer.offset
         seen = np.flatnonzero(reached & self.used & self.landed)
-        reached[seen] &= ~tracer.occluded(origins[seen], tracer.lift(self.position[seen], self.normal[seen]))
+        reached[seen] &= ~tracer.occluded(
+            origins[seen], tracer.lift(self.position[seen], self.normal[seen]), lifted=True
+        )
         missed = np.flatnonzero(reached & self.used & ~self.landed)
         reached[missed] &= ~tracer.closest(origins[missed], self.direction[missed]).hit
         return reached

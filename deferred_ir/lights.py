@@ -34,12 +34,12 @@ LIGHT = np.dtype(
 LIGHTS_PER_BLOCK = 192
 """Lights in a uniform block: OpenGL promises 16 KiB (204 lights), and blocks must start at multiples of 256 bytes."""
 
-NEAR = 2e-6
+NEAR = 1e-8
 """Near planes of camera and lights, as a fraction of the scene's scale: what is nearer is cut away.
 
-About 30 roundings of a coordinate as large, so that a VPL's own surface, which roundings put a little before or behind
-it, stays out of its map. Nearer walls must not: one that is cut lets light through. Depths, near / distance in 32-bit
-floats, have the same relative precision whatever the near plane.
+Walls so close to a light that they are cut let light through. A light's own surface, which roundings put a little
+before or behind it, is kept out of its map by lifting the light off instead (vpl_buffer.off_surface,
+lib/shadow.glsl). Depths, near / distance in 32-bit floats, have the same relative precision whatever the near plane.
 """
 
 SPOT_TILE = -1.0

@@ -178,9 +178,7 @@ class _Reader:
             self.notes.append(f"{self.path.name}: texture coordinates that are NaN or infinite are taken as 0")
             uvs[~np.isfinite(uvs)] = 0
         if uvs is not None and len(uvs):
-            # Textures repeat, so whole numbers may go, and 32 bits keep more of the rest.
-            shift = np.round((uvs.min(axis=0) + uvs.max(axis=0)) / 2)
-            uvs -= np.where(np.abs(shift) >= FAR_UVS, shift, 0)
+            uvs = homed(uvs)
         source = getattr(mesh.visual, "material", None)
         name, albedo, image, image_name = self._reflectance(source, colored=colors is not None)
         if image is not None and uvs is None:
@@ -265,6 +263,16 @@ class _Reader:
         if self.base_colors is not None:
             return np.clip(values, 0, 1)
         return linear_from_srgb(values / 255 if values.max() > 1 else values)
+
+
+def homed(uvs: Array) -> Array:
+    """Texture coordinates (n, 2) of a mesh, moved home by whole numbers where they lie far out.
+
+    Textures repeat, and 32 bits keep more of what is left.
+    """
+    shift = np.round((uvs.min(axis=0) + uvs.max(axis=0)) / 2)
+    moved: Array = uvs - np.where(np.abs(shift) >= FAR_UVS, shift, 0)
+    return moved
 
 
 def _turned_normals(normals: Array, linear: Array) -> Array:

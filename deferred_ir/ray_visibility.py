@@ -77,7 +77,7 @@ def _look(tracer: Tracer, seen: Surfaces, rows: Ints, vpls: np.ndarray, lifted: 
     for i, vpl in enumerate(vpls):
         asked = np.flatnonzero(_lit(vpl, position, face, smooth)) if vpl["emission"].any() else np.zeros(0, int)
         origins = starts[asked]
-        free = asked[~tracer.occluded(origins, np.broadcast_to(lifted[i], origins.shape))]
+        free = asked[~tracer.occluded(origins, np.broadcast_to(lifted[i], origins.shape), lifted=True)]
         words[i // BITS, free] |= np.uint32(1 << i % BITS)
         rays += len(asked)
     return words, rays

@@ -125,14 +125,15 @@ class Tracer:
         albedo[hit] = materials.albedo(self.scene, face[hit], weights)
         return Hits(face, position, normal, shading, albedo)
 
-    def occluded(self, origins: Array, targets: Array) -> Bools:
+    def occluded(self, origins: Array, targets: Array, *, lifted: bool = False) -> Bools:
         """Whether anything lies strictly between points (n, 3) and (n, 3), bool (n,).
 
         The far end stops short by a ten-thousandth of the way, so targets may lie on surfaces; an origin on a surface
-        needs its offset (see `lift`).
+        needs its offset (see `lift`). lifted: targets have theirs as well, and the whole way counts, since a wall may
+        stand close to them.
         """
         org, way = origins.astype(np.float32), (targets - origins).astype(np.float32)
-        reach = np.full(len(org), 1 - 1e-4, np.float32)
+        reach = np.full(len(org), 1 if lifted else 1 - 1e-4, np.float32)
         parts = self._map(lambda chunk: self._rays.occluded(org[chunk], way[chunk], reach[chunk]), len(org))
         return np.concatenate([np.zeros(0, bool), *parts])
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from .gl.resources import GpuBuffer
 from .graph import Buffer, Facts, Output
-from .lights import LIGHT, LIGHTS_PER_BLOCK, NEAR, SPOT_TILE, fill_records
+from .lights import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
 from .params import param
 from .scene import Scene
-from .typing import Bools, Ints
+from .typing import Array, Bools, Ints
 from .versions import new_versions
 from .vpls import Vpls
 
@@ -21,7 +21,7 @@ AUTO_CLAMP = 0.64
 """Clamp distance of one VPL in diagonals where short rays give back what it takes: best at 64 to 1024 VPLs of both a
 room and a cathedral, and flat about there (half or twice of it costs a tenth to a half of the error)."""
 
-ROUNDINGS = 16
+ROUNDINGS = 8
 """Of a coordinate: what a VPL's surface and its map may be apart by, with positions and their products rounded."""
 
 
@@ -58,9 +58,7 @@ def output(vpls: int, bounces: int = 1) -> Output:
 def packed(scene: Scene, vpls: Vpls, params: VplParams, tiles: Ints) -> np.ndarray:
     """LIGHT records (1 + n,) of the scene's spotlight and n VPLs; tiles: int (n,), of their maps in the atlas."""
     light = scene.spotlight
-    # Far out the roundings of a VPL's own surface reach beyond the near plane: it is lifted off by what is missing.
-    rounding = ROUNDINGS * 2.0**-24 * np.abs(vpls.position).max(axis=1, keepdims=True)
-    position = vpls.position + vpls.normal * np.maximum(rounding - NEAR * scene.geometry.scale, 0)
+    position = off_surface(scene, vpls.position, vpls.normal)
     records = np.zeros(1 + len(vpls), LIGHT)
     spot = np.array([light.position]), light.axis[None], np.array([light.emission])
     fill_records(records[:1], *spot, fov=light.fov, tile=SPOT_TILE)
@@ -68,6 +66,13 @@ def packed(scene: Scene, vpls: Vpls, params: VplParams, tiles: Ints) -> np.ndarr
     records["clamp_squared"][0] = light.radius
     records["clamp_squared"][1:] = (params.clamp_fraction * scene.geometry.diagonal) ** 2
     return records
+
+
+def off_surface(scene: Scene, position: Array, normal: Array) -> Array:
+    """Where VPLs stand, (n, 3): off their surfaces by its roundings, or their maps would show these here and there."""
+    size = np.maximum(np.abs(position).max(axis=1, keepdims=True), scene.geometry.scale)
+    lifted: Array = position + normal * (ROUNDINGS * 2.0**-24 * size)
+    return lifted
 
 
 def map_versions(lights: GpuBuffer, records: np.ndarray, scene: Scene) -> Ints:

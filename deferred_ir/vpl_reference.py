@@ -70,7 +70,7 @@ class Patch:
         normals = self.normal[..., None], self.shading_normal[..., None]
         result = _kernel(way, normal, *normals, edge=lights.edge, clamp=lights.clamp)
         pixel, vpl = np.nonzero(result)
-        hidden = self.tracer.occluded(self.lifted[pixel], lights.lifted[vpl])
+        hidden = self.tracer.occluded(self.lifted[pixel], lights.lifted[vpl], lifted=True)
         result[pixel[hidden], vpl[hidden]] = 0
         return result
 
@@ -88,7 +88,7 @@ class Patch:
             if len(lit) == 0:
                 continue
             targets = np.broadcast_to(lights.lifted[i], (len(lit), 3))
-            kernel[lit[self.tracer.occluded(self.lifted[lit], targets)]] = 0
+            kernel[lit[self.tracer.occluded(self.lifted[lit], targets, lifted=True)]] = 0
             for channel in range(3):
                 total[channel] += kernel * lights.emission[i, channel]
         return total

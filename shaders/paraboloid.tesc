@@ -19,7 +19,7 @@ patch out vec4 plane;
 patch out float gap;
 
 const float HIGHEST = 64.0;    // OpenGL promises so many parts
-const float ROUNDING = 0.05;   // of the near plane's distance: positions of the scene are no better known
+const float ROUNDING = 10.0;   // of the near plane's distance: positions of the scene are no better known
 const float WIDEST = 0.05;     // margin: so far behind the light's plane directions still have a place in the map
 const float EDGE_ON = 1e-4;    // sine: no closer to the light's own plane can a surface be told from it
 const float PART_BEND = 4.0;   // texels that a part's side may bend

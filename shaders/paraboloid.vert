@@ -16,7 +16,7 @@ in vec3 position;
 
 void main() {
     Light light = lights[light_index];
-    vec3 d = position - light.position;
+    vec3 d = position - map_origin(light);
 #if SPLIT
     light_of_corner = light_index;
     corner = d;

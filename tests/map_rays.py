@@ -12,6 +12,10 @@ from deferred_ir.tracing import Tracer
 
 AROUND = [(x, y) for y in (-1, 0, 1) for x in (-1, 0, 1)]
 CENTRE = AROUND.index((0, 0))
+START = 1e-6
+"""How far in front of a light rays start, in scales of the scene."""
+CLOSEST = NEAR / (100 * START)
+"""Depth at a hundred times that distance."""
 
 
 def tiles(one: Renderer, count: int) -> list[np.ndarray]:
@@ -41,7 +45,7 @@ def directions(record: Any, size: int, projection: str, texels: tuple[float, flo
 
 def start(tracer: Tracer, record: Any) -> np.ndarray:
     """A bit in front of a light, (3,), so that rays do not meet the surface on which it may lie."""
-    return record["position"] + 1e-6 * tracer.scene.geometry.diagonal * record["z_axis"].astype(float)
+    return record["position"] + START * tracer.scene.geometry.scale * record["z_axis"].astype(float)
 
 
 def depths(tracer: Tracer, record: Any, way: np.ndarray, projection: str) -> np.ndarray:
@@ -70,12 +74,12 @@ def through_light(tracer: Tracer, record: Any, way: np.ndarray) -> np.ndarray:
 def wrong_texels(tracer: Tracer, record: Any, tile: np.ndarray, projection: str) -> np.ndarray:
     """Which texels of a map (n, n) are off by 2 % from all that nine rays meet, up to a texel from their centre.
 
-    So silhouettes do not count. Nor does what is as close as the near plane, where a map is cut, or to the light's own
-    plane; nor a surface that goes through the light itself, of which only the rays, which start in front, see much.
+    So silhouettes do not count. Nor does what is so close that it matters where rays start, or as close to the light's
+    own plane; nor a surface that goes through the light itself, of which only the rays, which start in front, see much.
     """
     ways = np.array([directions(record, len(tile), projection, off) for off in AROUND])
     true = depths(tracer, record, ways, projection)
     cosine = ways[CENTRE] @ record["z_axis"].astype(float)
-    told = (cosine > 0.02) & (true.max(axis=0) < (0.5 if projection == "perspective" else 0.5 * cosine))
+    told = (cosine > 0.02) & (true.max(axis=0) < CLOSEST * (1.0 if projection == "perspective" else cosine))
     told &= ~through_light(tracer, record, ways).any(axis=0)
     return told & ((tile > 1.02 * true.max(axis=0)) | (tile < 0.98 * true.min(axis=0)))

@@ -16,6 +16,7 @@ from test_clusters import soup
 from deferred_ir.lights import LIGHT
 from deferred_ir.loading import builtin_scenes, load
 from deferred_ir.tracing import Tracer
+from deferred_ir.vpl_buffer import off_surface
 
 LIGHTS = 6
 ONES = np.ones((LIGHTS, 3))
@@ -41,7 +42,7 @@ def anywhere(scene, rng, fov, on_faces):
     faces = rng.choice(len(g.faces), LIGHTS, p=areas / areas.sum())
     position = (corners[faces] * rng.dirichlet(np.ones(3), LIGHTS)[..., None]).sum(axis=1)
     normal = g.face_normals[faces] * rng.choice([-1, 1], LIGHTS)[:, None]
-    return vpl_records(position, normal, ONES, fov=fov)
+    return vpl_records(off_surface(scene, position, normal), normal, ONES, fov=fov)
 
 
 @pytest.fixture(params=["perspective", "paraboloid"])

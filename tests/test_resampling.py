@@ -208,7 +208,7 @@ def test_one_candidate_a_vpl_is_what_it_always_was(renderer):
     one = renderer(SIZE, set={"vpl.candidates": 1})
     image = one.render(ROOMS, vpls=32, seed=3).radiance
     vpls = candidates(count=32, seed=3)
-    np.testing.assert_array_equal(lights(one)["position"][1:], vpls.position.astype("f4"))
+    np.testing.assert_allclose(lights(one)["position"][1:], vpls.position, atol=1e-5)  # lifted off their surfaces
     np.testing.assert_array_equal(lights(one)["emission"][1:], vpls.emission.astype("f4"))
     np.testing.assert_array_equal(image, renderer(SIZE).render(ROOMS, vpls=32, seed=3).radiance)
 

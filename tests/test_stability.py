@@ -13,16 +13,36 @@ from deferred_ir.reference import reference
 from deferred_ir.scene import Scene
 
 
-def test_vpls_beside_an_edge_do_not_shine_through_the_other_wall(renderer) -> None:
-    """In a closed box a hundredth of the scene wide, where many lie within 0.0001 of it of another wall."""
+@pytest.mark.parametrize("graph", ["deferred", "hemisphere", "accurate"])
+def test_vpls_beside_an_edge_do_not_shine_through_the_other_wall(renderer, graph: str) -> None:
+    """In a closed box a hundredth of the scene wide, where many lie within 0.0001 of it of another wall.
+
+    Near planes cut that wall away, the rim of paraboloid maps had no neighbours, and rays ended short of it.
+    """
     light = Spotlight((0.0, 0.0, 0.0), (0.3, -1.0, 0.2), 130.0, (1.0, 1.0, 1.0))
     walls = box((-1, -1, -1), (1, 1, 1))
     small = box((-0.015, -0.015, -0.015), (0.015, 0.015, 0.015))
     scene = build(walls, small, camera=room().camera, spotlight=light)
-    one = renderer((64, 64), set={"vpl.count": 128, "shadow_maps.vpl_size": 64})
+    one = renderer((64, 64), graph, set={"vpl.count": 128, "shadow_maps.vpl_size": 64})
     assert one.render(scene).radiance.max() == 0
     inside = replace(scene, camera=replace(scene.camera, position=(0.0, 0.0, 0.012), look_at=(0.0, 0.0, 0.0)))
     assert np.all(one.render(inside).radiance.max(axis=-1) > 0)
+
+
+@pytest.mark.parametrize("fov", [100.0, 170.0])
+def test_a_spotlight_in_a_wall_shines(renderer, fov: float) -> None:
+    """Roundings put the wall, askew, before the light or behind it."""
+    turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+    walls = box((-1, -1, -1), (1, 1, 1))
+    camera = replace(room().camera, position=tuple(turn @ (0.1, 0.2, 0.9)), look_at=tuple(turn @ (0.0, -0.3, -1.0)))
+    one = renderer((32, 32), set={"vpl.count": 0, "shadow_maps.spot_size": 256})
+    for place in np.random.default_rng(6).uniform(-0.9, 0.9, (6, 2)):
+        at, below = turn @ (place[0], 1.0, place[1]), turn @ (place[0], -1.0, place[1])
+        light = Spotlight(tuple(at), tuple(below), fov, (3.0, 2.0, 1.0))
+        scene = build(replace(walls, positions=walls.positions @ turn.T), camera=camera, spotlight=light)
+        found = one.render(scene).radiance
+        wanted = reference(scene, (32, 32), bounces=0).radiance
+        assert np.abs(found - wanted).mean() < 0.02 * wanted.mean()
 
 
 def giant(scene: Scene, times: float) -> Scene:

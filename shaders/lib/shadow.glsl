@@ -8,6 +8,8 @@
 #include "lib/frame.glsl"
 #include "lib/light.glsl"
 
+const float SPOT_LIFT = 100.0;  // near planes: a millionth of the scene
+
 bool spot_paraboloid(Light light) {
 #ifdef SPOT_PARABOLOID
     return SPOT_PARABOLOID == 1;
@@ -30,19 +32,27 @@ float texel_angle(Light light) {
     return 4.0 * light.curve * light.tan_half / (light.tile < 0.0 ? float(SPOT_SIZE) : float(VPL_SIZE));
 }
 
+// Where a light's map is seen from. The spotlight may hang in a surface, whose roundings must not hide what it looks at;
+// VPLs have been lifted off theirs (deferred_ir/vpl_buffer.py).
+vec3 map_origin(Light light) {
+    return light.position + light.z_axis * (light.tile < 0.0 ? SPOT_LIFT * frame.near : 0.0);
+}
+
 // Clip position in the light's planar map.
 vec4 planar_clip(Light light, vec3 position) {
-    vec3 d = position - light.position;
+    vec3 d = position - map_origin(light);
     return clip_position(vec2(dot(d, light.x_axis), dot(d, light.y_axis)), frame.near, planar_divisor(light, d));
 }
 
 // A point as a map knows it. slope: change of depth, a texel to the right and up, on the plane of the point's face.
-// bend: what makes it curved in a paraboloid map (see `receiver_plane`); 0 in a planar one.
+// bend: what makes it curved in a paraboloid map (see `receiver_plane`); 0 in a planar one. reach: how far from the middle
+// of a paraboloid map, 1 at its sides, four texels about a place are all drawn.
 struct Receiver {
     vec2 texel;  // in texels from the map's lower left corner
     float depth;
     vec2 slope;
     vec4 bend;
+    float reach;
 };
 
 // The point is lifted off its face by `offset` texels of the map of `size` texels: its depth and those in the map come
@@ -68,6 +78,7 @@ Receiver planar_receiver(Light light, vec3 position, vec3 normal, float size, fl
     // 1/w is linear in the map over a plane.
     r.slope = n * (2.0 / size * frame.near * light.tan_half * light.tan_half / plane_distance(d, normal));
     r.bend = vec4(0.0);
+    r.reach = 0.0;
     return r;
 }
 
@@ -88,6 +99,9 @@ Receiver paraboloid_receiver(Light light, vec3 position, vec3 normal, float size
     float step = 2.0 / size * tan_quarter, square = 0.5 * (1.0 + cosine) * step * step;
     r.bend = vec4(ndc * (tan_quarter * step * (1.0 + cosine)), square,
                   square * frame.near * (dot(normal, light.z_axis) / h + inverse));
+    // At the rim of the hemisphere, 1 / tan_quarter from the middle, drawing ends: four texels are 2 sqrt(2) / size away at
+    // most. tan_quarter is that of a quarter of the cone's angle, which is not 0.
+    r.reach = min(1.0 / tan_quarter - 2.83 / size, 1.0);
     return r;
 }
 
@@ -96,12 +110,6 @@ Receiver paraboloid_receiver(Light light, vec3 position, vec3 normal, float size
 vec3 nearest_of_four(Receiver r, vec2 texel, float depth, vec2 slope) {
     vec2 f = fract(texel - 0.5), nearer = max(-f * slope, (1.0 - f) * slope);
     return vec3(texel, max(r.depth, depth + nearer.x + nearer.y));
-}
-
-// Where to compare, in texels, kept half a texel inside, so that a 2x2 comparison never leaves the map or tile; and the
-// depth to compare with.
-vec3 comparison(Receiver r, float size) {
-    return nearest_of_four(r, clamp(r.texel, 0.5, size - 0.5), r.depth, r.slope);
 }
 
 // The plane of the receiver's face `offset` texels away: x, y the slope there, z the depth. In a planar map 1/w is linear
@@ -114,16 +122,23 @@ vec3 receiver_plane(Receiver r, vec2 offset) {
     return vec3(slope, r.depth + rise);
 }
 
-// The same `offset` texels away. Beyond the disc of a paraboloid map lies what the light does not shine on.
+// Where to compare, in texels, and the depth to compare with, `offset` texels away. Kept half a texel inside, so that a 2x2
+// comparison never leaves the map or tile. Beyond the disc of a paraboloid map lies what the light does not shine on.
 vec3 comparison(Receiver r, float size, vec2 offset) {
     vec2 texel = r.texel + offset, ndc = texel * (2.0 / size) - 1.0;
-    if (r.bend.z > 0.0) texel -= ndc * (1.0 - min(inversesqrt(max(dot(ndc, ndc), TINY)), 1.0)) * (0.5 * size);
+    if (r.reach > 0.0) texel -= ndc * (1.0 - min(r.reach * inversesqrt(max(dot(ndc, ndc), TINY)), 1.0)) * (0.5 * size);
     texel = clamp(texel, 0.5, size - 0.5);
     vec3 plane = receiver_plane(r, texel - r.texel);
     return nearest_of_four(r, texel, plane.z, plane.xy);
 }
 
+vec3 comparison(Receiver r, float size) {
+    if (r.reach > 0.0) return comparison(r, size, vec2(0.0));
+    return nearest_of_four(r, clamp(r.texel, 0.5, size - 0.5), r.depth, r.slope);
+}
+
 Receiver SPOT_RECEIVER(Light light, vec3 position, vec3 normal, float size, float offset) {
+    light.position = map_origin(light);
     if (spot_paraboloid(light)) return paraboloid_receiver(light, position, normal, size, offset);
     return planar_receiver(light, position, normal, size, offset);
 }

@@ -39,8 +39,9 @@ def run_record(
         step = next((step for step in plan.steps if step.name == entry["name"]), None)
         if step and (subpasses := step.work.subpasses(step.descriptions, renderer.executor.ports(step))):
             entry["subpasses"] = [dict(subpass) for subpass in subpasses]
-    memory, lost = renderer.memory(), _bias(renderer, scene, graph, plan)
+    memory = renderer.memory()
     left_out = [*savings.of_scene(scene), *savings.of_frames(renderer, plan, record)]
+    lost = _bias(renderer, scene, graph, plan)
     # Last, for it draws over what the frames have left.
     time = (len(record.frame_ms) - 1) / FRAMES_PER_SECOND if scene.moves else 0.0
     left_out += savings.of_passes(renderer, scene.at(time), plan, seed=seed)

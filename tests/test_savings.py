@@ -40,6 +40,7 @@ def test_filters_without_vpls_are_measured_with_the_bytes_that_they_would_take(r
     assert {"interleave", "interleaved", "gather"} <= found.keys()
     assert found["interleaved"].why.startswith("there are no VPLs")
     assert all(found[name].ms >= 0 for name in ("interleaved", "gather"))
+    assert found["Embree's scene"].why == "no ray was traced"
     assert found["interleaved"].bytes == 16 * SIZE[0] * SIZE[1]
     assert more >= found["interleaved"].bytes
 
@@ -57,6 +58,7 @@ def test_lights_layers_and_shared_textures_are_told(renderer):
     assert lights.why == "they light nothing that is seen"
     assert found["lighting.radiance"].why.startswith("it has the texture of interleaved.shares")
     assert found["lighting.radiance"].bytes == 16 * SIZE[0] * SIZE[1]
+    assert "Embree's scene" not in found
     layers = found["shadow_maps.atlas"]
     assert layers.why.endswith("of 65 layers are enough for the lights that live")
     assert layers.bytes % (4 * 64 * 64) == 0

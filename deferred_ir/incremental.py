@@ -86,7 +86,7 @@ class IncrementalVpls:
         place = np.zeros((len(self.used), 2))
         place[slots] = cells.sites
         self._shoot(light, tracer, fresh, disc.directions(place[fresh]))
-        again = self._maps.chosen(self._lag(), whole - len(fresh))
+        again = self._maps.worst(self.weights * self.albedo.sum(axis=1), whole - len(fresh))
         self.version[again] = new_versions(len(again))
         drawn = np.union1d(fresh, again)
         self._maps.drawn(drawn)
@@ -110,7 +110,7 @@ class IncrementalVpls:
                 normals[own] = normals[own] @ move[:3, :3].T
         self.used &= self._reached(light, tracer, disc) & (self._lag() <= FARTHEST * geometry.diagonal)
         on_moved = np.isin(self._group, np.array(list(moves), int) + 1)
-        self._maps.stale |= on_moved | self._maps.see(self.shown, self.shown_normal)
+        self._maps.age(self._maps.see(self.shown, self.shown_normal), on_moved, self.shown)
         self._maps.stale &= self._shines()
         if self._maps.see(np.array([light.position]), light.axis[None]).any():
             self._spot = None, 0

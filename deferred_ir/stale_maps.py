@@ -9,49 +9,58 @@ import numpy as np
 from .geometry import Geometry
 from .typing import Array, Bools, Ints
 
+TURNED = 0.01
+"""Of its size: how far a model counts as moved besides, for it may have turned in its place."""
+TINY = 1e-300
+CARRIED = 8.0
+"""So much more wrong is the map of a light that moved itself, for all that it sees has moved."""
+
 
 class StaleMaps:
-    """Of each of `count` slots, whether its map is stale, and since when it has been as it is."""
+    """Of each of `count` slots, whether its map is stale, and how much it is: `wrong`, in no unit."""
 
     def __init__(self, count: int) -> None:
         self.stale = np.zeros(count, bool)
-        self._drawn = np.zeros(count, np.int64)
-        self._frame = 0
+        self.wrong = np.zeros(count)
         self._before: Geometry | None = None
-        self._boxes: Array = np.zeros((0, 2, 3))
+        self._boxes: Array = np.zeros((2, 0, 2, 3))
 
     def follow(self, geometry: Geometry) -> Mapping[int, Array]:
         """Begin a frame: the rigid transforms (4, 4) of the moving models that are elsewhere than in the last one."""
         before, self._before = self._before, geometry
-        self._frame += 1
-        self._boxes = self._boxes[:0]
+        self._boxes = self._boxes[:, :0]
         if before is None or before is geometry:
             return {}
         moved = np.flatnonzero((before.poses != geometry.poses).any(axis=(1, 2)))
-        self._boxes = np.concatenate([before.boxes[moved], geometry.boxes[moved]])
+        self._boxes = np.stack([before.boxes[moved], geometry.boxes[moved]])
         return {number: geometry.poses[number] @ np.linalg.inv(before.poses[number]) for number in moved.tolist()}
 
     def see(self, positions: Array, axes: Array) -> Bools:
         """In front of which lights at `positions` along `axes` (n, 3) a model has moved in this frame, bool (n,)."""
         seen = np.zeros(len(positions), bool)
-        for low, high in self._boxes:
+        for low, high in self._boxes.reshape(-1, 2, 3):
             farthest = ((low + high) / 2 - positions) * axes + (high - low) / 2 * np.abs(axes)
             seen |= farthest.sum(axis=1) > 0
         return seen
 
+    def age(self, seen: Bools, carried: Bools, positions: Array) -> None:
+        """Make maps more wrong: those that have `seen` models move, and those that moved with one, (slots,) each.
+
+        By how far the models' boxes moved and how large they look; positions: of the lights (slots, 3).
+        """
+        self.stale |= seen | carried
+        for before, now in self._boxes.swapaxes(0, 1):
+            size = np.linalg.norm(now[1] - now[0])
+            way = np.abs(now - before).max() + TURNED * size
+            square = np.maximum(((now.mean(axis=0) - positions) ** 2).sum(axis=1), size**2 + TINY)
+            self.wrong += way * size / square * np.where(carried, CARRIED, seen)
+
     def drawn(self, slots: Ints) -> None:
         """The maps of `slots` are drawn in this frame."""
         self.stale[slots] = False
-        self._drawn[slots] = self._frame
+        self.wrong[slots] = 0
 
-    def chosen(self, lag: Array, most: int) -> Ints:
-        """Up to `most` stale maps to draw, int (m,): half of them those that are most behind by `lag`, (slots,).
-
-        The rest are those drawn longest ago.
-        """
+    def worst(self, power: Array, most: int) -> Ints:
+        """Up to `most` stale maps, int (m,), that do most harm: how wrong they are, times the lights' `power`."""
         stale = np.flatnonzero(self.stale)
-        behind = stale[np.argsort(-lag[stale], kind="stable")]
-        first = behind[lag[behind] > 0][: (max(most, 0) + 1) // 2]
-        rest = np.setdiff1d(stale, first)
-        oldest = rest[np.argsort(self._drawn[rest], kind="stable")]
-        return np.concatenate([first, oldest[: max(most, 0) - len(first)]])
+        return stale[np.argsort(-(self.wrong * power)[stale], kind="stable")[: max(most, 0)]]

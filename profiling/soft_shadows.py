@@ -114,9 +114,9 @@ def width(visibility: Array, height: float, radius: float = RADIUS) -> float:
 class _NothingBetween(Tracer):
     """Rays that nothing stops on their way to the light."""
 
-    def occluded(self, origins: Array, targets: Array) -> Bools:
+    def occluded(self, origins: Array, targets: Array, *, lifted: bool = False) -> Bools:
         """False for all."""
-        del targets
+        del targets, lifted
         return np.zeros(len(origins), bool)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..gl.resources import GpuBuffer
 from ..lights import LIGHT
-from ..typing import Array
+from ..typing import Array, Bools
 from .canvas import Area
 from .session import Session
 
@@ -28,7 +28,7 @@ def records(session: Session) -> np.ndarray | None:
     return None
 
 
-def project(points: Array, session: Session) -> tuple[Array, Array]:
+def project(points: Array, session: Session) -> tuple[Array, Bools]:
     """Pixels (n, 2) of the picture, y down, for points (n, 3), and which lie before the eye, bool (n,)."""
     eye, (width, height) = session.eye, session.size
     a, b, c = eye.ray_axes((width, height))

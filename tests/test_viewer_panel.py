@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 from PIL import Image
-from virtual_display import FEW, SIZE, Spy, act, cornell, frames, middle, picture, rendered, xdo
+from virtual_display import FEW, SIZE, Spy, act, arrange, cornell, frames, middle, picture, rendered, xdo
 
 from deferred_ir import cli
 from deferred_ir.config import graph_hash, load_graph
@@ -16,9 +16,11 @@ from deferred_ir.dropping import shining
 from deferred_ir.lights import NEAR
 from deferred_ir.loading import load
 from deferred_ir.viewer import panel as panels
+from deferred_ir.viewer import truth_panel
 from deferred_ir.viewer.frames import records
 from deferred_ir.viewer.panel import WIDTH
 
+PARTS = ("Scene", "Light", "Passes", "Parameters", "Reference", "Shadow map", "Save", "Keys")
 TALL = 900
 """Height of a window in which all of the panel's rows show."""
 
@@ -27,7 +29,8 @@ TALL = 900
 def tall(viewer):
     viewer.window.resize((SIZE[0] + WIDTH, TALL))
     frames(viewer, 2)
-    return viewer
+    yield viewer
+    arrange(viewer)
 
 
 def words(viewer, owner):
@@ -132,18 +135,12 @@ def test_no_word_of_the_panel_is_clipped(tall):
     viewer.session.choose("accurate")
     viewer.session.adjust("vpl.count", 4)
     viewer.controls.switches["map"] = True
-    frames(viewer, 2)
-    panel = viewer.panel
-    parts = [panel, panel.passes, panel.maps, panel.truth]
-    spies = [Spy(part, open_all=True) for part in parts]
-    for _ in range(2):  # what opens is laid out in the frame after
-        for spy in spies:
-            spy.__enter__()
-        viewer.frame()
-        for spy in spies:
-            spy.__exit__()
-    right = viewer.window.size[0]
-    known = {name: place for spy in spies for name, place in spy.places.items()}
+    arrange(viewer, *PARTS)
+    panel, known, right = viewer.panel, {}, viewer.window.size[0]
+    for part in (panel, panel.passes, panel.maps, panel.truth):
+        with Spy(part) as spy:
+            viewer.frame()
+        known |= spy.places
     assert {"scene", "light FOV", "clamp", "paths a pixel", "linear depth"} <= known.keys()
     assert not {name: place for name, place in known.items() if place[2] > right}
 
@@ -244,6 +241,59 @@ def test_frames_of_incremental_go_on_until_they_come_to_rest(viewer):
         drawn += 1
     assert 1 < drawn < 50
     assert not viewer.frame()
+
+
+def click(viewer, label, owner=None):
+    x, y = middle(viewer, owner or viewer.panel, label, inside=8)
+    act(viewer, "mousemove", "--sync", x, y, "click", 1)
+
+
+def test_parameters_are_set_by_the_mouse(tall):
+    """Those of any pass, made of their declarations: a slider, a choice, a number that can be automatic."""
+    viewer, session = tall, tall.session
+    arrange(viewer, "Scene", "Parameters")
+    x, y = middle(viewer, viewer.panel, "count")
+    act(viewer, "mousemove", "--sync", x, y, "mousedown", 1)
+    act(viewer, "mousemove", "--sync", x + 60, y)
+    act(viewer, "mouseup", 1)
+    vpl = session.renderer.graph().nodes["vpl"].work.params
+    assert vpl.count > 8
+    click(viewer, "auto##clamp")
+    x, y = middle(viewer, viewer.panel, "pattern")
+    act(viewer, "mousemove", "--sync", x, y, "click", 1)
+    act(viewer, "mousemove", "--sync", x, y + 25, "click", 1)  # the first of the list, which opens below
+    changed = session.renderer.graph().nodes["vpl"].work.params
+    assert (vpl.clamp, vpl.pattern) != ("auto", "random")
+    assert (changed.clamp, changed.pattern) == ("auto", "random")
+    session.adjust("vpl.count", 8)
+    viewer.frame()
+    assert np.array_equal(picture(viewer)[:, : SIZE[0]], rendered(cornell(), session.size, set=dict(session.settings)))
+
+
+def test_scene_and_graph_are_chosen_from_lists(tall):
+    viewer = tall
+    click(viewer, "graph")
+    click(viewer, "interleaved")
+    assert viewer.session.graph == "interleaved"
+    click(viewer, "scene")
+    click(viewer, "colors")
+    assert viewer.session.scene.name == "colors"
+    assert viewer.session.error == ""
+
+
+def test_a_reference_is_asked_for_by_a_button(tall, monkeypatch):
+    viewer, truth = tall, tall.panel.truth
+    monkeypatch.setattr(truth_panel, "SPP", (1, 2))
+    truth._spp = 0
+    click(viewer, "Passes")
+    click(viewer, "Reference")
+    told = []
+    click(viewer, "compare with reference", truth)
+    while truth.truth.running:
+        told += [name for name, _ in words(viewer, truth)]
+    viewer.frame()
+    assert truth.truth.result is not None
+    assert "progress_bar" in told or truth.truth.progress == 1.0
 
 
 def test_a_number_is_typed_into_a_slider(tall):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
@@ -120,11 +120,12 @@ def restore(viewer: Viewer) -> None:
 class Spy:
     """Dear ImGui for one part of the panel, which notes its words, and where in the window they are; use with `with`.
 
+    opened: the parts of the panel that are to be open, None to leave them.
     places: by the first word of each call, its rectangle (x0, y0, x1, y1). calls: (function, word) in order.
     """
 
-    def __init__(self, owner: Any, *, open_all: bool = False) -> None:
-        self._owner, self._imgui, self._open_all = owner, owner._imgui, open_all
+    def __init__(self, owner: Any, opened: Container[str] | None = None) -> None:
+        self._owner, self._imgui, self._opened = owner, owner._imgui, opened
         self.calls: list[tuple[str, str]] = []
         self.places: dict[str, tuple[float, float, float, float]] = {}
 
@@ -139,8 +140,8 @@ class Spy:
         found = getattr(self._imgui, name)
 
         def call(*words: Any, **more: Any) -> Any:
-            if self._open_all and name == "collapsing_header":
-                self._imgui.set_next_item_open(True)
+            if self._opened is not None and name == "collapsing_header":
+                self._imgui.set_next_item_open(words[0] in self._opened)
             result = found(*words, **more)
             if words and isinstance(words[0], str):
                 self.calls.append((name, words[0]))
@@ -151,9 +152,15 @@ class Spy:
         return call if callable(found) and name.islower() else found
 
 
-def middle(viewer: Viewer, owner: Any, label: str) -> tuple[int, int]:
-    """A point of the widget of `owner` whose label begins so: well inside, at half its height."""
+def arrange(viewer: Viewer, *opened: str) -> None:
+    """Open these parts of the panel and no others, at first Scene, Light and Passes."""
+    with Spy(viewer.panel, opened or ("Scene", "Light", "Passes")):
+        frames(viewer, 2)
+
+
+def middle(viewer: Viewer, owner: Any, label: str, inside: int = 100) -> tuple[int, int]:
+    """A point of the widget of `owner` whose label begins so: `inside` pixels from its left, at half its height."""
     with Spy(owner) as spy:
         viewer.frame()
     x0, y0, _, y1 = next(place for name, place in spy.places.items() if name.startswith(label))
-    return round(x0 + 100), round((y0 + y1) / 2)
+    return round(x0 + inside), round((y0 + y1) / 2)

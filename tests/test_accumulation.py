@@ -200,7 +200,7 @@ def test_the_record_has_one_frame_for_each_picture_and_all_its_time(renderer):
         added.image()
     one.finish(record)
     assert len(record.frame_ms) == len(record.laps) == 2
-    assert record.counters == 12 * [{"vpls_alive": 8, "maps_drawn": 9, "lights_dropped": 0}]
+    assert record.counters == 12 * [{"vpls_alive": 8, "maps_drawn": 9, "lights_dropped": 0, "lights_skipped": 0}]
     for laps, wall in zip(record.laps, record.frame_ms, strict=True):
         assert list(laps) == ["vpl", "gbuffer", "shadow_maps", "lighting", "accumulate", "tonemap"]
         assert 0.7 * wall < sum(cpu for _, cpu in laps.values()) < wall

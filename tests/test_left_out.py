@@ -134,7 +134,7 @@ def test_a_target_that_nothing_reads_is_not_written(renderer, tmp_path):
     )
     (tmp_path / "flat.frag").write_text(
         "layout(binding = UNIT_DEPTH) uniform sampler2D depth;\nlayout(location = 0) out vec4 color;\n"
-        "void main() { color = vec4(texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r * 1000.0); }\n"
+        "void main() { color = vec4(sign(texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r)); }\n"
     )
 
     class Flat(FullscreenPass):

@@ -81,7 +81,8 @@ class Gather(Pass):
         angle, shares = radians(self.params.angle), int(io.defines["INTERLEAVE"]) ** 2
         # An even window is off centre: in frames with fresh seeds to all sides, so that their mean is not.
         side = frame.seed & 1, frame.seed >> 1 & 1
-        windows = (io["depth"].version, io["normals"].version, shares, angle, side) if frame.reuse else None
+        drawn = io["depth"].version, io["normals"].version
+        windows = (*drawn, shares, self.params, side) if frame.reuse else None
         known = windows is not None and io["missing"].kept == windows
         defines = variants.of_pixels(frame, vpls.records)
         kept = {"SMOOTH": defines["SMOOTH"], "KEEP": int(frame.reuse), "KNOWN": int(known)}

@@ -53,6 +53,13 @@ bool has(uvec2 found, int share) {
     return ((SHARES > 32 ? found[share >> 5] : found.x) >> (share & 31) & 1u) == 1u;
 }
 
+// What `missing` holds: bits of the shares that are; and where 16 are enough, then of those that are there on the other
+// side in x, in y, in both.
+uvec4 noted(uvec2 found, uvec3 beyond) {
+    if (SHARES > 16) return uvec4(~found, 0u, 0u);
+    return uvec4(~found.x & 0xffffu | beyond.x << 16, beyond.y | beyond.z << 16, 0u, 0u);
+}
+
 Centre centre(ivec2 pixel, ivec2 size) {
     Centre c;
     c.pixel = pixel;
@@ -74,13 +81,14 @@ void main() {
     vec4 sum = vec4(0.0);
     uvec2 found = uvec2(0u);  // a bit for each share
 #if KNOWN
-    found = ~imageLoad(missing, pixel).rg;
+    uvec2 note = imageLoad(missing, pixel).rg;
+    found = SHARES > 16 ? ~note : uvec2(~note.x & 0xffffu, 0u);
     if (found == uvec2(0u)) return;  // background; on a surface the pixel finds its own share
 #else
     Centre c = centre(pixel, size);
     if (c.depth <= 0.0) {  // background
 #if KEEP
-        imageStore(missing, pixel, uvec4(~0u));
+        imageStore(missing, pixel, noted(uvec2(0u), uvec3(0u)));
 #endif
         return;
     }
@@ -99,9 +107,6 @@ void main() {
 #endif
         }
     bool lonely = sum.a <= fewest && sum.a < float(SHARES);
-#if !KNOWN
-    if (KEEP == 1 || lonely) imageStore(missing, pixel, uvec4(~found, 0u, 0u));
-#endif
 #if HAS_NEAR_FIELD
     // It is no share's: neighbours have parts of it whichever they are.
     vec4 given = vec4(0.0);
@@ -117,6 +122,9 @@ void main() {
     const vec3 near = vec3(0.0);
 #endif
     if (lonely) {
+#if !KNOWN
+        imageStore(missing, pixel, noted(found, uvec3(0u)));
+#endif
         irradiance.rgb = (sum.rgb - given.rgb) / float(SHARES) + near;
         imageStore(thin, thin_place(imageAtomicAdd(count, ivec2(0), 1u), size.x), uvec4(pixel.y * size.x + pixel.x));
         return;
@@ -124,17 +132,31 @@ void main() {
     // A share that is missing on one side of the pixel may be there on the other. (Where a loop has nothing to do for a
     // group of pixels it is skipped; a branch may not be.)
     int taps = sum.a < float(SHARES) ? SHARES : 0;
-#if KNOWN
+#if KNOWN && INTERLEAVE > 4
     Centre c;
     for (int once = 0; once < min(taps, 1); ++once) c = centre(pixel, size);
 #endif
+    uvec3 beyond = uvec3(0u);
     for (int tap = 0; tap < taps; ++tap) {
         ivec2 other = corner + ivec2(tap % N, tap / N), turn = N - 2 * N * ivec2(greaterThanEqual(other, pixel));
-        int tries = has(found, share_of(other)) ? 0 : 3;
+        int share = share_of(other);
         vec4 one = vec4(0.0);
-        for (int i = 0; i < tries && one.a == 0.0; ++i)  // to the other side in x, in y, in both
+#if KNOWN && INTERLEAVE <= 4
+        bvec3 there = notEqual(uvec3(note.x >> 16, note.y, note.y >> 16) & 1u << share, uvec3(0u));
+        ivec2 by = turn * ivec2(there.x || there.z, there.y || there.z);
+        int fetches = any(there) ? 1 : 0;
+        for (int i = 0; i < fetches; ++i) one = vec4(texelFetch(shares, split_place(other + by, size), 0).rgb, 1.0);
+#else
+        int tries = has(found, share) ? 0 : 3;
+        for (int i = 0; i < tries && one.a == 0.0; ++i) {  // to the other side in x, in y, in both
             one = neighbour(c, other + turn * ivec2(i != 1, i != 0));
+            beyond[i] |= uint(one.a) << (share & 15);
+        }
+#endif
         sum += one;
     }
+#if KEEP && !KNOWN
+    imageStore(missing, pixel, noted(found, beyond));
+#endif
     irradiance.rgb = sum.rgb / sum.a;
 }

@@ -228,6 +228,11 @@ def test_windows_that_are_kept_with_the_g_buffer_give_the_same_pixels(renderer, 
         windows = one.executor.resource(("gather", "missing")).kept if step else None
         np.testing.assert_array_equal(*(made.render(scene, seed=3).radiance for made in (one, other)))
         assert (one.executor.resource(("gather", "missing")).kept == windows) == (step in (1, 2, 4))
+    for change in ({"gather.fewest": 0.0}, {"gather.fewest": 0.9}, {"gather.angle": 5.0}):
+        for made in (one, other):
+            made.configure(set=settings | change)
+        for scene in (CAMERA, replace(LIGHT, camera=CAMERA.camera)):
+            np.testing.assert_array_equal(*(made.render(scene, seed=3).radiance for made in (one, other)))
 
 
 def test_a_pass_of_another_type_starts_afresh(renderer):

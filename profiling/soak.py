@@ -10,12 +10,15 @@ status 1 where something grows afterwards or an image differs.
 from __future__ import annotations
 
 import argparse
+import ctypes
+import gc
 import hashlib
 import resource
 import sys
 import time as clock
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
@@ -31,7 +34,7 @@ STRETCH = 20
 FRESH = 10
 """One in so many loads, the first among them, gets a context of its own."""
 SCENES = ("cornell", "colors")
-SLACK = 16
+SLACK = 8
 """MiB that resident memory may grow by: allocators and drivers take it in larger pieces."""
 SETTINGS: tuple[dict[str, Any], ...] = (
     {"graph": "deferred", "size": (48, 32), "set": {"vpl.count": 16}},
@@ -50,7 +53,7 @@ ROUND = 2 * len(SETTINGS)
 
 @dataclass(frozen=True)
 class Count:
-    """What there was after so many frames and loads: objects by kind, and the most memory so far, MiB resident."""
+    """What there was after so many frames and loads: objects by kind, and memory in MiB."""
 
     frames: int
     loads: int
@@ -70,9 +73,8 @@ class Soak:
 
     def note(self, one: ir.Renderer) -> None:
         """Count objects and memory."""
-        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         with one.gpu.ctx:
-            self.counts.append(Count(self.frames, self.loads, one.gpu.gl.objects(), memory))
+            self.counts.append(Count(self.frames, self.loads, one.gpu.gl.objects(), held()))
 
     def compare(self, kind: str, image: ir.Image) -> None:
         """Hold an image against the first of its kind."""
@@ -99,6 +101,14 @@ class Soak:
         if last.memory > first.memory + SLACK:
             grown.append(f"memory: {first.memory:.0f} MiB became {last.memory:.0f}")
         return grown + self.different
+
+
+def held() -> float:
+    """MiB resident once all that is free is given back to Linux: else allocators keep as much as there ever was."""
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize() / 2**20
 
 
 def soak(frames: int, loads: int, seconds: float) -> Iterator[Soak]:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 _U, _I, _F, _P = ctypes.c_uint, ctypes.c_int, ctypes.c_float, ctypes.c_void_p
 KINDS = "Texture", "Buffer", "Program", "VertexArray", "Framebuffer", "Sampler", "Query"
 """Of objects that are counted."""
-HIGHEST = 1 << 13
-"""Names of objects are small numbers: beyond it none is looked for."""
+HIGHEST = 1 << 17
+"""Names of objects are small numbers, though drivers may count on: beyond it none is looked for."""
 _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "ActiveTexture": (None, _U),
     "BindFramebuffer": (None, _U, _U),

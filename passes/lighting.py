@@ -75,6 +75,7 @@ class Lighting(Pass):
         """The same light by light, without those that a tile lies behind."""
         tiles = Tiles.of(io["depth"].read()[..., 0], frame.scene.camera, frame.near)
         packed, made = draws(tiles, records)
+        io.gpu.ctx.finish()  # maps that are still being drawn would be timed with what comes after this pass
         buffer = io.gpu.uniforms(packed.tobytes())
         io.framebuffer.clear_color()
         size = LIGHTS_PER_BLOCK * records.itemsize

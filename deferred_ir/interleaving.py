@@ -15,14 +15,21 @@ SHUFFLE = 8191
 """Seed of the permutation, the same in every frame."""
 
 
-def deal(count: int, n: int) -> tuple[Ints, Ints]:
-    """Deal `count` VPLs to the n^2 shares: order, int (count,), and starts, int (n^2 + 1,).
+def dealt(slots: Ints, capacity: int) -> Ints:
+    """In which order VPLs are dealt to the shares: int (n,), of VPLs with `slots` (n,) out of `capacity`, each its own.
 
-    Share s has the VPLs order[starts[s]:starts[s + 1]]. Every VPL is in one share, and shares differ by one at most.
-    The order is shuffled, so that what is left of the pattern has no structure.
+    Shuffled, so that what is left of the pattern has no structure, and by slots: where VPLs come and go, those that
+    stay keep their order, and all but a few their shares.
     """
-    order = np.random.Generator(np.random.PCG64(SHUFFLE)).permutation(count)
-    return order, np.arange(n * n + 1) * count // (n * n)
+    ranks = np.empty(capacity, np.intp)
+    ranks[np.random.Generator(np.random.PCG64(SHUFFLE)).permutation(capacity)] = np.arange(capacity)
+    return np.argsort(ranks[slots])
+
+
+def share_starts(count: int, n: int) -> Ints:
+    """Where the n^2 shares of `count` VPLs begin and the last ends, int (n^2 + 1,); they differ by one at most."""
+    begins: Ints = np.arange(n * n + 1) * count // (n * n)
+    return begins
 
 
 def sub_buffers(size: tuple[int, int], n: int) -> list[tuple[int, int, int, int]]:

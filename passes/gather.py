@@ -20,7 +20,7 @@ from deferred_ir import variants
 from deferred_ir.dropping import last_shining
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
-from deferred_ir.interleaving import deal
+from deferred_ir.interleaving import share_starts
 from deferred_ir.io import Io
 from deferred_ir.params import param
 from deferred_ir.typing import Ints
@@ -116,7 +116,7 @@ class Gather(Pass):
 
 def _ranges(vpls: np.ndarray, shares: int, start: int, stop: int) -> Ints:
     """Where in the block from `start` to `stop` of VPLs, LIGHT records (n,), each share begins and ends, int (s, 2)."""
-    starts = np.clip(deal(len(vpls), round(shares**0.5))[1], start, stop)
+    starts = np.clip(share_starts(len(vpls), round(shares**0.5)), start, stop)
     ends = [first + last_shining(vpls[first:end]) for first, end in itertools.pairwise(starts)]
     ranges: Ints = np.column_stack([starts[:-1], ends]) - start
     return np.where((ranges[:, 1] > ranges[:, 0])[:, None], ranges, 0)

@@ -12,7 +12,7 @@ from deferred_ir.dropping import in_order, shining_first
 from deferred_ir.errors import GraphError
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass
-from deferred_ir.interleaving import deal
+from deferred_ir.interleaving import dealt, share_starts
 from deferred_ir.io import Io
 from deferred_ir.params import param
 
@@ -61,8 +61,10 @@ class Interleave(Pass):
         del frame
         lights = io["lights"].records
         vpls = lights[in_order(lights)[1:]]
-        order, starts = deal(len(vpls), self.params.n)
-        parts = np.union1d(starts, np.arange(0, len(vpls), io["vpls"].description.block))
+        order = dealt(vpls["tile"].astype(int), io["lights"].description.records - 1)
+        parts = np.union1d(
+            share_starts(len(vpls), self.params.n), np.arange(0, len(vpls), io["vpls"].description.block)
+        )
         io["vpls"].write(shining_first(vpls[order], parts))
 
 

@@ -13,7 +13,7 @@ from deferred_ir import variants
 from deferred_ir.dropping import last_shining
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Facts, Input, Output, Pass, Texture
-from deferred_ir.interleaving import deal, sub_buffers
+from deferred_ir.interleaving import share_starts, sub_buffers
 from deferred_ir.io import Io
 
 
@@ -48,7 +48,7 @@ class Interleaved(Pass):
         ctx, block = io.gpu.ctx, vpls.description.block
         program = io.program("interleaved.frag", defines=variants.of_pixels(frame, vpls.records))
         ctx.blend_func = ctx.ONE, ctx.ONE
-        starts = deal(len(vpls.records), n)[1].tolist()
+        starts = share_starts(len(vpls.records), n).tolist()
         for share, rectangle in enumerate(sub_buffers(frame.size, n)):
             io.gpu.gl.Viewport(*rectangle)
             start, stop = starts[share : share + 2]

@@ -15,7 +15,7 @@ import numpy as np
 from deferred_ir.direct_light import on_pixels
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
-from deferred_ir.interleaving import deal, places
+from deferred_ir.interleaving import places, share_starts
 from deferred_ir.io import Io
 from deferred_ir.params import param
 from deferred_ir.ray_visibility import BITS, cost_of_maps, cost_of_rays, masks
@@ -76,7 +76,7 @@ class ShadowRays(Pass):
         tracer, seen = frame.tracer(), frame.surfaces(io["depth"], io["normals"])
         n = round(parts**0.5)
         share, place = places(seen.pixel, frame.size, n)
-        starts = deal(len(vpls), n)[1]
+        starts = share_starts(len(vpls), n)
         shares = [(np.flatnonzero(share == i), slice(int(starts[i]), int(starts[i + 1]))) for i in range(parts)]
         words, _ = masks(tracer, seen, vpls, shares)
         width, height = frame.size

@@ -14,7 +14,7 @@ import numpy as np
 
 from deferred_ir.frame import Frame
 from deferred_ir.graph import Description, Input, Output, Pass, Texture
-from deferred_ir.interleaving import deal
+from deferred_ir.interleaving import share_starts
 from deferred_ir.io import Io
 from deferred_ir.parallel import in_order
 from deferred_ir.surfaces import Surfaces
@@ -75,7 +75,7 @@ def _irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, pa
         fov=2 * degrees(acos(1 - float(vpls["one_minus_cos"][0]))),
         clamp=sqrt(vpls["clamp_squared"][0]) / geometry.diagonal,
     )
-    starts = deal(len(vpls), round(parts**0.5))[1].tolist()
+    starts = share_starts(len(vpls), round(parts**0.5)).tolist()
     hits = Hits(np.zeros(len(bits), int), seen.position, seen.normal, seen.shading_normal, np.ones((len(bits), 3)))
     rows = [np.flatnonzero(bits[:, share // 32] >> np.uint32(share % 32) & 1) for share in range(parts)]
     tasks = [share for share in range(parts) if len(rows[share]) and starts[share] < starts[share + 1]]

@@ -12,7 +12,7 @@ from small_scenes import Mesh, box, build, crooked_room, plane, quad, room, sphe
 
 from deferred_ir.camera import Camera
 from deferred_ir.errors import GraphError
-from deferred_ir.interleaving import deal, sub_buffers
+from deferred_ir.interleaving import dealt, share_starts, sub_buffers
 from deferred_ir.lights import NEAR
 from deferred_ir.loading import load
 from deferred_ir.surfaces import from_gbuffer
@@ -22,19 +22,34 @@ ANGLE = np.radians(25)
 ABOVE = Camera((0.0, 3.0, 0.001), (0.0, 0.0, 0.0), fov=30.0)
 
 
-@given(count=st.integers(0, 5000), n=st.sampled_from([1, 2, 4, 8]))
-def test_every_vpl_is_dealt_once_and_shares_are_even(count, n):
-    order, starts = deal(count, n)
-    assert sorted(order) == list(range(count))
+@given(count=st.integers(0, 5000), more=st.integers(0, 100), n=st.sampled_from([1, 2, 4, 8]))
+def test_every_vpl_is_dealt_once_and_shares_are_even(count, more, n):
+    slots = np.random.default_rng(count).permutation(count + more)[:count]
+    starts = share_starts(count, n)
+    assert sorted(dealt(slots, count + more)) == list(range(count))
     assert (starts[0], starts[-1]) == (0, count)
     assert len(starts) == n * n + 1
     assert np.ptp(np.diff(starts)) <= 1
 
 
 def test_the_order_is_fixed_and_has_no_structure():
-    order, _ = deal(1024, 4)
-    assert (order == deal(1024, 4)[0]).all()
+    order = dealt(np.arange(1024), 1024)
+    assert (order == dealt(np.arange(1024), 1024)).all()
     assert abs(np.corrcoef(order, np.arange(1024))[0, 1]) < 0.1
+
+
+def test_vpls_that_stay_keep_their_order_and_nearly_all_their_shares():
+    """One that goes would change the share of every other, if they were dealt by number."""
+    slots, starts = np.arange(256), share_starts(255, 4)
+    before = dealt(slots, 256)
+    for gone in (0, 100, 255):
+        left = np.delete(slots, gone)
+        after = left[dealt(left, 256)]
+        assert (after == before[before != gone]).all()
+        share = dict(zip(before.tolist(), np.repeat(np.arange(16), np.diff(share_starts(256, 4))), strict=True))
+        now = np.repeat(np.arange(16), np.diff(starts))
+        moved = sum(share[slot] != new for slot, new in zip(after.tolist(), now, strict=True))
+        assert moved <= 15
 
 
 @given(size=st.tuples(st.integers(1, 70), st.integers(1, 70)), n=st.sampled_from([1, 2, 4, 8]))

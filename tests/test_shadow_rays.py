@@ -12,7 +12,7 @@ from small_scenes import crooked_room, room, smooth_scene
 from deferred_ir import vpl_reference
 from deferred_ir.config import load_graph
 from deferred_ir.graph import Facts
-from deferred_ir.interleaving import deal, places, sub_buffers
+from deferred_ir.interleaving import dealt, places, share_starts, sub_buffers
 from deferred_ir.path_tracer import PathTracer
 from deferred_ir.planning import compile
 from deferred_ir.vpls import Vpls, cast
@@ -52,7 +52,7 @@ def test_sub_buffers_hold_what_the_reference_finds_for_each_share(renderer, n, c
     pixel = np.arange(SIZE[0] * SIZE[1])
     hits = hits.rows((SIZE[1] - 1 - pixel // SIZE[0]) * SIZE[0] + pixel % SIZE[0])  # bottom row first
     vpls = cast(scene.spotlight, tracer, count, "sobol")
-    order, starts = deal(len(vpls), n)
+    order, starts = dealt(np.arange(len(vpls)), count), share_starts(len(vpls), n)
     share, place = places(pixel, SIZE, n)
     expected = np.zeros((len(pixel), 3))
     for s in range(n * n):

@@ -158,5 +158,5 @@ void main() {
 #if KEEP && !KNOWN
     imageStore(missing, pixel, noted(found, beyond));
 #endif
-    irradiance.rgb = sum.rgb / sum.a;
+    irradiance.rgb = sum.rgb / sum.a;  // at least the pixel itself lies on its surface
 }

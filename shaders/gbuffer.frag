@@ -15,7 +15,7 @@ void main() {
     normals = encode_normals(s.shading_normal, s.normal);
 #endif
 #ifdef TARGET_ALBEDO
-    albedo = vec4(s.albedo, 1.0);
+    albedo = vec4(min(s.albedo, 65504.0), 1.0);  // half floats end there; infinity times a light of 0 is no number
 #endif
     WRITE_DEPTH(frame.near);
 }

@@ -42,7 +42,8 @@ vec3 across(vec3 a, vec3 b) {
     return before(b, a) ? -unit(cross(b, a)) : unit(cross(a, b));
 }
 
-// Where the way from a point in front of the light to one behind it meets the light's plane.
+// Where the way from a point in front of the light to one behind it meets the light's plane: one distance is above 0, the
+// other is not, so they differ.
 vec3 cut(vec3 front, vec3 behind, float along_front, float along_behind) {
     return mix(front, behind, along_front / (along_front - along_behind));
 }
@@ -71,7 +72,8 @@ vec3 plane_along(vec3 a, vec3 b) {
     return foot / max(dot(foot, foot), TINY);
 }
 
-// The line of the map through start and end, unit directions in the light's frame: see lib/part.glsl.
+// The line of the map through start and end, unit directions in the light's frame: see lib/part.glsl. One is in front of
+// the light and the other near it (straight_side), so neither points straight back, where 1 + z is 0.
 vec3 line(vec3 start, vec3 end) {
     vec2 from = start.xy / (1.0 + start.z), way = end.xy / (1.0 + end.z) - from;
     vec2 left = vec2(-way.y, way.x) * (turn * inversesqrt(max(dot(way, way), TINY)));
@@ -87,7 +89,7 @@ void main() {
     vec3 normal = cross(b - a, c - a);
     float h = dot(normal, a);
     bool seen_edge_on = abs(h) <= ROUNDING * frame.near * length(normal);
-    // Behind the light, or on its own surface, or without any area in the map.
+    // Behind the light, or on its own surface, or without any area in the map, where h is 0.
     if (seen_edge_on || all(lessThanEqual(along, max(EDGE_ON * sizes, vec3(frame.near))))) {
         gl_TessLevelOuter[0] = gl_TessLevelOuter[1] = gl_TessLevelOuter[2] = gl_TessLevelOuter[3] = 0.0;
         return;

@@ -23,6 +23,7 @@ vec3 neutral(vec3 c) {
     const float d = 1.0 - start;
     float bent = 1.0 - d * d / (peak + d - start);
     c *= bent / peak;  // peak is at least `start` here
+    // The bent peak is the lower one.
     return mix(c, vec3(bent), 1.0 - 1.0 / (desaturation * (peak - bent) + 1.0));
 }
 

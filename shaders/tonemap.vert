@@ -22,7 +22,8 @@ float automatic_exposure() {
             sum += luminance;
             lit += float(luminance > 0.0);
         }
-    return sum > 0.0 ? MIDDLE_GREY * lit / sum : 1.0;  // nothing lit: nothing to expose for
+    // Nothing lit: nothing to expose for. Of hardly anything the quotient overflows, and infinity times 0 is no number.
+    return sum > 0.0 ? min(MIDDLE_GREY * lit / sum, 1e37) : 1.0;
 }
 
 void main() {

@@ -92,3 +92,23 @@ def test_the_scale_is_the_diagonal_unless_things_lie_far_out() -> None:
     assert scene.geometry.scale == scene.geometry.diagonal
     assert scene.geometry.centred is scene.geometry
     assert giant(scene, 1e6).geometry.scale < 20 * scene.geometry.diagonal
+
+
+def test_reflectance_beyond_half_floats_stays_finite(renderer) -> None:
+    """A driver may store infinity, and times no light that is no number."""
+    scene = room((1e6, 1e6, 1e6))
+    found = renderer((32, 32), set={"vpl.count": 0, "shadow_maps.spot_size": 64}).render(scene).radiance
+    assert np.isfinite(found).all()
+    assert found.max() > 0
+
+
+@pytest.mark.parametrize("factor", [1e-20, 1e20])
+def test_exposure_makes_up_for_any_brightness(renderer, factor: float) -> None:
+    scene = room()
+    one = renderer((32, 32), set={"vpl.count": 4, "shadow_maps.vpl_size": 64})
+    other = replace(
+        scene, spotlight=replace(scene.spotlight, emission=tuple(np.multiply(scene.spotlight.emission, factor)))
+    )
+    plain, found = one.render(scene), one.render(other)
+    np.testing.assert_allclose(found.radiance / factor, plain.radiance, rtol=1e-5, atol=1e-9)
+    assert np.abs(found.display.astype(int) - plain.display).max() <= 1

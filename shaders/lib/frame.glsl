@@ -13,7 +13,7 @@ vec4 project(vec3 position) {
     return clip_position(vec2(dot(frame.clip[0].xyz, p), dot(frame.clip[1].xyz, p)), frame.near, dot(frame.clip[2].xyz, p));
 }
 
-// World position behind NDC (x, y) at a reversed depth above 0.
+// World position behind NDC (x, y) at a reversed depth above 0, which the background, at 0, is not asked for.
 vec3 unproject(vec2 ndc, float depth) {
     return frame.camera + (frame.ray[0].xyz * ndc.x + frame.ray[1].xyz * ndc.y + frame.ray[2].xyz) * (frame.near / depth);
 }

@@ -62,9 +62,9 @@ vec3 lifted(Light light, vec3 from, vec3 normal, float size, float offset, float
 }
 
 // Distance of the light behind the plane of the face; where the plane goes through the light no light arrives, and a
-// millionth of the way to the point stands for 0.
+// millionth of the way to the point stands for 0, or TINY where the point is the light's own.
 float plane_distance(vec3 d, vec3 normal) {
-    return min(dot(normal, d), -1e-6 * length(d));
+    return min(dot(normal, d), -1e-6 * length(d) - TINY);
 }
 
 Receiver planar_receiver(Light light, vec3 position, vec3 normal, float size, float offset) {
@@ -114,7 +114,7 @@ vec3 nearest_of_four(Receiver r, vec2 texel, float depth, vec2 slope) {
 
 // The plane of the receiver's face `offset` texels away: x, y the slope there, z the depth. In a planar map 1/w is linear
 // on a plane. In a paraboloid map coordinates are tangents of half the angle, and 1/distance is a quadratic in them over
-// another.
+// another: `divisor` is (1 + |p|^2) there over that here, p the coordinates, so it is above 0.
 vec3 receiver_plane(Receiver r, vec2 offset) {
     float square = dot(offset, offset), divisor = 1.0 + dot(r.bend.xy, offset) + r.bend.z * square;
     float rise = (dot(r.slope, offset) - r.bend.w * square) / divisor;

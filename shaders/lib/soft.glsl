@@ -13,6 +13,7 @@ vec3 map_vector(Light light, vec2 texel) {
     return vec3(2.0 * p, 1.0 - dot(p, p)) / (1.0 + dot(p, p));
 }
 
+// v points forwards: at the receiver, from where it is moved within the plane across the light's axis.
 vec2 map_texel(Light light, vec3 v) {
     float divisor = spot_paraboloid(light) ? light.curve * (length(v) + v.z) : v.z;
     return (v.xy / (divisor * light.tan_half) * 0.5 + 0.5) * SPOT_SIZE;
@@ -27,7 +28,7 @@ float blocker(DEPTHS map, Light light, Receiver r, vec3 v, vec2 offset, float ra
     float nearer = v.z * depth - b.z * r.depth;
     vec2 off = frame.near * (v.z * b.xy - b.z * v.xy);
     bool between = nearer > 0.0 && b.z > 0.0 && dot(off, off) <= radius * radius * nearer * nearer;
-    // The receiver's own face is none.
+    // The receiver's own face is none. `between` says that b.z is above 0; a receiver's depth is.
     return between && depth > receiver_plane(r, texel - r.texel).z ? v.z * depth / (b.z * r.depth) : 0.0;
 }
 

@@ -1,4 +1,4 @@
-"""`deferred-ir check`: measurements that say whether the renderer can be relied on. So far one, of visibility.
+"""`deferred-ir check`: measurements that say whether the renderer can be relied on: extreme cases, or visibility.
 
 A check is a module of the folder profiling that yields rows, and makes a line of a table of each.
 """
@@ -30,13 +30,13 @@ def run(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
     json = Path(arguments.json) if arguments.json is not None else None
     if json:
         check_folder(json)
-    # All checks run if none is chosen, so --visibility alone changes nothing yet.
+    if not arguments.visibility:
+        return _run_stability(arguments, settings, json)
     visibility: Any = importlib.import_module(f"{ROOM}.visibility")
     usual = visibility.Options()
     size = usual.size if arguments.size is None else chosen_size(arguments.size, RenderDefaults())
     sizes = _sizes(arguments.sizes, settings) or usual.vpl_sizes
-    names = [arguments.scene] if arguments.scene is not None else [name for name, _ in builtin_scenes()]
-    scenes = [load(name) for name in names]
+    scenes = _scenes(arguments)
     work = []
     for scene in scenes:
         options = visibility.Options(
@@ -52,6 +52,47 @@ def run(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
     if json:
         write(json, {"visibility": [row.as_dict() for row in rows]})
     return 0
+
+
+def _scenes(arguments: argparse.Namespace) -> list[Scene]:
+    """The scene that is named, else the built-in ones."""
+    names = [arguments.scene] if arguments.scene is not None else [name for name, _ in builtin_scenes()]
+    return [load(name) for name in names]
+
+
+def _run_stability(arguments: argparse.Namespace, settings: Mapping[str, Any], json: Path | None) -> int:
+    """Stiff and extreme cases, a line for each as soon as it is known; 1 where one fails, else 0."""
+    given = [f"--{name}" for name in ("sizes", "pairs", "size", "vpls", "seed") if getattr(arguments, name) is not None]
+    given += [f"--set {name}" for name in settings]
+    if given:
+        raise SettingError(f"{given[0]}: the extreme cases have settings of their own; give --visibility as well")
+    stability: Any = importlib.import_module(f"{ROOM}.stability")
+    cases: Any = importlib.import_module(f"{ROOM}.stability_cases").CASES
+    scenes = _scenes(arguments)
+    rows = _stability(stability, cases, scenes, arguments.device)
+    if json:
+        write(json, {"stability": [row.as_dict() for row in rows]})
+    return 0 if all(row.holds for row in rows) else 1
+
+
+def _stability(stability: Any, cases: Sequence[Any], scenes: Sequence[Scene], device: str) -> list[Any]:
+    """All rows, printed as they come, and how many there were, also where Ctrl-C ends them."""
+    from tqdm import tqdm
+
+    width, total = max(len(scene.name) for scene in scenes), len(scenes) * len(cases)
+    found = list[Any]()
+    with stability.Judge(device) as judge:  # a fault of the device is none of a case
+        print(stability.heading(width), flush=True)
+        try:
+            with tqdm(total=total, leave=False, disable=not sys.stderr.isatty(), file=sys.stderr) as bar:
+                for row in (row for scene in scenes for row in judge.rows(scene, cases)):
+                    found.append(row)
+                    tqdm.write(stability.line(row, width), file=sys.stdout)
+                    sys.stdout.flush()
+                    bar.update()
+        finally:
+            print(f"{len(found)} of {total} cases, {sum(not row.holds for row in found)} failed", flush=True)
+    return found
 
 
 def _visibility(visibility: Any, work: Sequence[tuple[Scene, Any]]) -> list[Any]:

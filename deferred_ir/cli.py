@@ -89,7 +89,9 @@ def _parser() -> Parser:
     profile = command("profile", _profile, "Measure error against run time: graphs x numbers of VPLs x seeds.")
     _add_profile_options(profile)
 
-    check = command("check", _check, "Measure whether the renderer can be relied on: so far, shadow maps against rays.")
+    check = command(
+        "check", _check, "Check stiff and extreme cases, or shadow maps against rays; exit status 1 if one fails."
+    )
     _add_check_options(check)
 
     view = command("view", _view, "Open a window in which camera and light move and the picture follows.")
@@ -178,7 +180,7 @@ def _add_check_options(check: Parser) -> None:
     scene_help = "a built-in scene, a scene file (.toml) or a model (default: all built-in scenes)"
     check.add_argument("scene", nargs="?", metavar="SCENE", help=scene_help)
     check.add_argument(
-        "--visibility", action="store_true", help="shadow maps against rays (as all checks: runs if none is chosen)"
+        "--visibility", action="store_true", help="instead: shadow maps against rays, with the options that follow"
     )
     check.add_argument("--sizes", metavar="N,N", help="of VPLs' maps, texels (default: 256,512)")
     check.add_argument("--pairs", type=_positive, metavar="N", help="of pixel and light, a row (default: 200000)")

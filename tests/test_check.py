@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
+from importlib import import_module
 
 import pytest
 
@@ -13,7 +14,7 @@ from deferred_ir import check_command
 from deferred_ir.cli import main
 from deferred_ir.loading import builtin_scenes, load
 
-SMALL = ("--size", "32x32", "--vpls", "4", "--pairs", "100", "--device", "software")
+SMALL = ("--visibility", "--size", "32x32", "--vpls", "4", "--pairs", "100", "--device", "software")
 ONE = (*SMALL, "--set", "shadow_maps.spot_size=128", "--sizes", "32")
 SHARES = ["mismatch", "leaks", "false_shadows", "light_wrong", "light_leaked", "light_lost"]
 
@@ -52,7 +53,7 @@ def small_scene(tmp_path):
 
 
 def test_the_table_has_a_line_for_each_kind_of_light_and_size(capsys):
-    head, *lines = checked(capsys, "cornell", "--visibility", *SMALL, "--sizes", "16,32")
+    head, *lines = checked(capsys, "cornell", *SMALL, "--sizes", "16,32")
     assert re.split(r"  +", head)[:4] == ["scene", "lights", "projection", "map"]
     assert len({len(line) for line in [head, *lines]}) == 1
     found = [re.split(r"  +", line) for line in lines]
@@ -68,7 +69,7 @@ def test_the_table_has_a_line_for_each_kind_of_light_and_size(capsys):
 
 def test_json_holds_every_figure(capsys, tmp_path):
     path = tmp_path / "f.json"
-    lines = checked(capsys, "cornell", "--visibility", *ONE, "--json", str(path))
+    lines = checked(capsys, "cornell", *ONE, "--json", str(path))
     told = json.loads(path.read_text())
     assert list(told) == ["visibility"]
     assert len(told["visibility"]) == len(lines) - 1
@@ -91,11 +92,9 @@ def test_a_seed_gives_the_same_figures_again(capsys):
     assert first != other
 
 
-def test_without_a_choice_all_checks_run_on_all_scenes(capsys):
-    """Visibility is all there is so far."""
+def test_without_a_scene_all_are_checked(capsys):
     lines = checked(capsys, *ONE)
     assert {line.split()[0] for line in lines[1:]} == {name for name, _ in builtin_scenes()}
-    assert lines == checked(capsys, "--visibility", *ONE)
 
 
 def test_set_narrows_the_sizes(capsys):
@@ -105,7 +104,7 @@ def test_set_narrows_the_sizes(capsys):
 
 def test_the_scene_file_has_a_say(capsys, small_scene):
     """Its VPLs, its seed, and those of its parameters that the graph has."""
-    arguments = ["--size", "32x32", "--pairs", "100", "--device", "software", "--sizes", "32"]
+    arguments = ["--visibility", "--size", "32x32", "--pairs", "100", "--device", "software", "--sizes", "32"]
     render = (
         'graph = "forward"\nvpls = 4\nseed = 3\nset = { "forward.lights_per_draw" = 2, "shadow_maps.spot_size" = 128 }'
     )
@@ -136,14 +135,25 @@ def test_few_pairs_are_told(capsys, monkeypatch):
     [
         (["nowhere"], "nowhere: no such file and no built-in scene of that name"),
         (["cornell", "--pairs", "0"], "argument --pairs: '0' is no whole number from 1 up"),
-        (["cornell", "--sizes", "256,big"], "--sizes 256,big: 'big' is no whole number; write 256,512"),
-        (["cornell", "--sizes", "256,,512"], "--sizes 256,,512: '' is no whole number"),
-        (["cornell", "--sizes", "8"], "shadow_maps.vpl_size: is 8, but wants a whole number at least 16"),
-        (["cornell", "--sizes", "64", "--set", "shadow_maps.vpl_size=32"], "contradict each other; give one"),
-        (["cornell", "--size", "64"], "--size 64: wants WIDTHxHEIGHT"),
-        (["cornell", "--set", "shadow_maps.vpl_siez=64"], "no such parameter; did you mean 'vpl_size'?"),
-        (["cornell", "--set", "shadow_map.vpl_size=64"], "no pass 'shadow_map' in this graph"),
-        (["cornell", "--vpls", "4", "--set", "vpl.count=8"], "contradict each other; give one"),
+        (["cornell", "--visibility", "--sizes", "256,big"], "--sizes 256,big: 'big' is no whole number; write 256,512"),
+        (["cornell", "--visibility", "--sizes", "256,,512"], "--sizes 256,,512: '' is no whole number"),
+        (
+            ["cornell", "--visibility", "--sizes", "8"],
+            "shadow_maps.vpl_size: is 8, but wants a whole number at least 16",
+        ),
+        (
+            ["cornell", "--visibility", "--sizes", "64", "--set", "shadow_maps.vpl_size=32"],
+            "contradict each other; give one",
+        ),
+        (["cornell", "--visibility", "--size", "64"], "--size 64: wants WIDTHxHEIGHT"),
+        (
+            ["cornell", "--visibility", "--set", "shadow_maps.vpl_siez=64"],
+            "no such parameter; did you mean 'vpl_size'?",
+        ),
+        (["cornell", "--visibility", "--set", "shadow_map.vpl_size=64"], "no pass 'shadow_map' in this graph"),
+        (["cornell", "--visibility", "--vpls", "4", "--set", "vpl.count=8"], "contradict each other; give one"),
+        (["cornell", "--size", "64x64"], "--size: the extreme cases have settings of their own; give --visibility"),
+        (["cornell", "--set", "vpl.count=8"], "--set vpl.count: the extreme cases have settings of their own"),
         (["cornell", "--json", "no/such/f.json"], "no/such/f.json: "),
         (["cornell", "--device", "no such"], "no such"),
     ],
@@ -154,6 +164,72 @@ def test_faults_are_one_line(capsys, tmp_path, monkeypatch, arguments, message):
     line = fault(capsys, tmp_path, *arguments)
     assert line.startswith("deferred-ir")
     assert message in line
+
+
+# Extreme cases
+
+
+@pytest.fixture
+def few_cases(monkeypatch):
+    """One that holds, one that fails."""
+    cases = import_module("deferred_ir.profiling.stability_cases")
+    stability = import_module("deferred_ir.profiling.stability")
+    fails = stability.Case("brighter", cases.NAMED["E times 1e+10"].change, "itself", bound=1e-6, size=(16, 16), vpls=1)
+    monkeypatch.setattr(cases, "CASES", (replace(cases.NAMED["image 1x1"], middle=(3, 3)), fails))
+    return cases.CASES
+
+
+def test_extreme_cases_make_a_table_and_a_status(capsys, few_cases, monkeypatch, tmp_path):
+    path = tmp_path / "f.json"
+    assert main(["check", "cornell", "--device", "software", "--json", str(path)]) == 1
+    head, good, bad, total = capsys.readouterr().out.splitlines()
+    assert head.split() == ["scene", "case", "graph", "against", "figure", "bound", "verdict"]
+    assert re.fullmatch(r"cornell  image 1x1 +deferred +itself +\S+ +9\.5e-07  holds", good)
+    assert re.fullmatch(r"cornell  brighter +deferred +itself +1\.0e\+10 +1\.0e-06  FAILS", bad)
+    assert total == "2 of 2 cases, 1 failed"
+    one, other = json.loads(path.read_text())["stability"]
+    assert one["holds"] is True
+    assert (other["case"], other["scene"], other["holds"]) == ("brighter", "cornell", False)
+    assert other["figure"] == pytest.approx(1e10, rel=1e-3)
+    monkeypatch.setattr("deferred_ir.profiling.stability_cases.CASES", few_cases[:1])
+    assert main(["check", "cornell", "--device", "software"]) == 0
+
+
+def test_a_case_that_cannot_be_drawn_fails_with_its_reason(capsys, few_cases, monkeypatch):
+    broken = replace(few_cases[0], settings={"shadow_maps.budget": 1})
+    monkeypatch.setattr("deferred_ir.profiling.stability_cases.CASES", (broken,))
+    assert main(["check", "cornell", "--device", "software"]) == 1
+    assert "error" in (line := capsys.readouterr().out.splitlines()[1])
+    assert "the spotlight's map of 2048x2048 alone needs 16 MiB" in line.partition("FAILS: ")[2]
+
+
+def test_ctrl_c_tells_what_was_done(tmp_path):
+    running = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "deferred_ir",
+            "check",
+            "cornell",
+            "--device",
+            "software",
+            "--json",
+            str(tmp_path / "f"),
+        ],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert [running.stdout.readline()[:7] for _ in range(2)] == ["scene  ", "cornell"]
+    running.send_signal(signal.SIGINT)
+    output, error = running.communicate(timeout=60)
+    assert running.returncode == 130
+    assert re.fullmatch(r"\d+ of \d+ cases, \d+ failed", output.splitlines()[-1])
+    assert error.splitlines()[-1] == "deferred-ir: interrupted"
+    assert not list(tmp_path.iterdir())
+
+
+# Both
 
 
 def test_ctrl_c_leaves_no_file(tmp_path):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from .errors import DeviceError, GraphError
 from .graph import Plan, Texture
 from .scene import Scene
 from .timing import Record
@@ -76,18 +78,26 @@ def of_frames(renderer: Renderer, plan: Plan, record: Record) -> list[LeftOut]:
 def of_passes(renderer: Renderer, scene: Scene, plan: Plan, *, vpls: int | None = None, seed: int = 0) -> list[LeftOut]:
     """Passes and targets that `plan` does without; those that another scene or output would need are run and measured.
 
-    Call it when all frames are drawn and read: it draws into what they have left.
+    Call it when all frames are drawn and read: it draws into what they have left. Where they cannot run here, since
+    their maps would not fit for one, they stay without figures.
     """
-    full = renderer.plan(scene, vpls, keep_all=True)
-    running = {step.name for step in plan.steps}
-    extra = [step.name for step in full.steps if step.name not in running]
-    ms: dict[str, float] = {}
+    ms, nbytes = dict[str, float](), dict[str, int]()
     if plan.left_out:
-        record, reuse, renderer.reuse = Record(), renderer.reuse, False
+        with suppress(DeviceError, GraphError):
+            ms = _timed(renderer, scene, plan, vpls=vpls, seed=seed)
+            nbytes = renderer.executor.nbytes()
+    return [LeftOut(name, why, ms.get(name), nbytes.get(name)) for name, why in plan.left_out.items()]
+
+
+def _timed(renderer: Renderer, scene: Scene, plan: Plan, *, vpls: int | None, seed: int) -> dict[str, float]:
+    """GPU time of each pass that runs with `keep_all` and not in `plan`, ms."""
+    full = renderer.plan(scene, vpls, keep_all=True)
+    extra = {step.name for step in full.steps} - {step.name for step in plan.steps}
+    record, reuse, renderer.reuse = Record(), renderer.reuse, False
+    try:
         for turn in range(1 + TURNS):
             renderer.draw(scene, full, seed=seed, steps=extra, record=record if turn else None)
         renderer.finish(record)
+    finally:
         renderer.reuse = reuse
-        ms = {str(entry["name"]): float(entry["gpu_ms"]) for entry in record.passes()}
-    nbytes = renderer.executor.nbytes()
-    return [LeftOut(name, why, ms.get(name), nbytes.get(name)) for name, why in plan.left_out.items()]
+    return {str(entry["name"]): float(entry["gpu_ms"]) for entry in record.passes()}

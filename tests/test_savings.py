@@ -10,6 +10,8 @@ from small_scenes import room, smooth_scene
 from test_left_out import SIZE, gable
 
 from deferred_ir import savings
+from deferred_ir.accumulation import Accumulation
+from deferred_ir.errors import DeviceError
 from deferred_ir.gl.resources import FORMATS, GpuTexture
 from deferred_ir.graph import Texture
 from deferred_ir.profiling import left_out
@@ -43,6 +45,39 @@ def test_filters_without_vpls_are_measured_with_the_bytes_that_they_would_take(r
     assert found["Embree's scene"].why == "no ray was traced"
     assert found["interleaved"].bytes == 16 * SIZE[0] * SIZE[1]
     assert more >= found["interleaved"].bytes
+
+
+def test_what_could_not_run_is_told_without_figures(renderer):
+    """A dark spotlight needs no maps, and maps of so many VPLs would not fit."""
+    dark = replace(room(), spotlight=replace(room().spotlight, emission=(0.0, 0.0, 0.0)))
+    found, _ = told(renderer, dark, "deferred", **{"vpl.count": 65536})
+    assert found["shadow_maps"].why == "no light needs one: the spotlight emits nothing"
+    assert found["shadow_maps"].ms is found["shadow_maps"].bytes is None
+
+
+def test_measuring_that_fails_leaves_the_renderer_as_it_was(renderer, monkeypatch):
+    one = renderer(SIZE, set={"vpl.count": 4}, reuse=True)
+    plan = one.plan(room(), outputs=["radiance"])
+    one.draw(room(), plan)
+    with monkeypatch.context() as full:
+        full.setattr(one.executor, "run", partial(_refuse, DeviceError("no room")))
+        entries = savings.of_passes(one, room(), plan)
+    assert {entry.what: entry.ms for entry in entries}["tonemap"] is None
+    assert one.reuse
+
+
+def _refuse(error, *_, **__):
+    raise error
+
+
+def test_frames_of_a_mean_are_counted_without_what_shows_it(renderer):
+    one, record = renderer(SIZE, set={"vpl.count": 4}, reuse=True), Record()
+    mean = Accumulation(one, room(), one.plan(room()), record=record)
+    for _ in range(3):
+        mean.draw()
+    mean.show()
+    assert record.kept == [(), ("gbuffer",), ("gbuffer",)]
+    assert record.reused()[0][:2] == ("gbuffer", 2)
 
 
 def test_what_is_a_choice_is_not_measured(renderer):

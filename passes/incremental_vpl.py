@@ -64,10 +64,12 @@ class IncrementalVpl(Pass):
             lights.write(packed(frame.scene, NONE, p, NONE.ray))
             return
         key = p, frame.seed
-        if lights.kept is None or lights.kept[0] != key:
-            lights.kept = key, IncrementalVpls(p.count, frame.seed)
-        state: IncrementalVpls = lights.kept[1]
+        before, state = lights.kept or (None, None)
+        if state is None or before != key:
+            state = IncrementalVpls(p.count, frame.seed)
+        lights.kept = None  # an update that is broken off leaves nothing to go on from
         vpls = state.update(light, frame.tracer(), least=p.least, most=p.most)
+        lights.kept = key, state
         if not state.at_rest:
             io.repeat()
         versions = np.append(state.spot_version(light), state.version[vpls.ray])

@@ -271,3 +271,16 @@ def test_with_the_whole_budget_it_is_as_good_as_afresh(renderer):
     one.draw(scene, plan, time=0.5)
     afresh = one.read(plan).radiance
     assert kept.mean() == pytest.approx(afresh.mean(), rel=0.05)
+
+
+def test_an_update_that_is_broken_off_starts_afresh(renderer, monkeypatch):
+    """Else VPLs would have gone with their models in part."""
+    one, fresh = (renderer(SIZE, "incremental", set=SETTINGS) for _ in range(2))
+    for time in (0.0, 0.1, 0.2):
+        one.render(SCENE, time=time)
+    with monkeypatch.context() as broken:
+        broken.setattr(StaleMaps, "age", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            one.render(SCENE, time=0.5)
+    for time in (0.5, 0.6):
+        np.testing.assert_array_equal(*(made.render(SCENE, time=time).radiance for made in (one, fresh)))

@@ -16,6 +16,7 @@ from test_far_from_origin import away
 
 from deferred_ir import load
 from deferred_ir.lights import Spotlight
+from deferred_ir.map_mesh import PosedMesh
 from deferred_ir.motion import ModelMotion
 from deferred_ir.reference import reference
 from deferred_ir.renderer import Renderer
@@ -310,6 +311,18 @@ def test_what_is_kept_between_frames_sees_that_models_move(renderer, graph):
         np.testing.assert_array_equal(found, other.render(scene, vpls=8, time=time).radiance)
         if time == 6.0:  # at rest since 2 s
             assert one.executor.counters["maps_drawn"] == 0
+
+
+def test_a_move_that_is_broken_off_is_done_again(renderer, monkeypatch):
+    one, other, scene = renderer(SIZE, reuse=True), renderer(SIZE), two()
+    one.render(scene, vpls=8)
+    with monkeypatch.context() as broken:
+        broken.setattr(PosedMesh, "move", lambda *_: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            one.render(scene, vpls=8, time=0.3)
+    for time in (0.0, 0.3):
+        found = one.render(scene, vpls=8, time=time).radiance
+        np.testing.assert_array_equal(found, other.render(scene, vpls=8, time=time).radiance)
 
 
 def test_a_motion_of_a_scene_file(tmp_path, renderer):

@@ -153,6 +153,23 @@ def test_a_frame_that_is_broken_off_runs_again(renderer, monkeypatch):
     assert "vpl" in drawn(one, ROOM)
 
 
+class Broken:
+    """Stands for an OpenGL buffer that the driver takes nothing into."""
+
+    def write(self, *_: Any, **__: Any) -> None:
+        raise ZeroDivisionError
+
+
+def test_lights_that_were_not_uploaded_light_the_next_frame(renderer, monkeypatch):
+    one = settled(renderer(SIZE, set=SETTINGS, reuse=True))
+    with monkeypatch.context() as broken:
+        broken.setattr(one.executor.resource(("vpl", "lights")), "buffer", Broken())
+        with pytest.raises(ZeroDivisionError):
+            one.render(BRIGHTER)
+    expected = renderer(SIZE, set=SETTINGS).render(BRIGHTER)
+    np.testing.assert_array_equal(one.render(BRIGHTER).radiance, expected.radiance)
+
+
 class Watched:
     """Stands for a frame and notes which of its parts a pass reads."""
 

@@ -252,12 +252,12 @@ class GpuBuffer:
         """Replace the first len(records) records."""
         if len(records) > self.description.records or records.itemsize != self.description.stride:
             raise ValueError(f"{len(records)} records of {records.itemsize} bytes into a buffer of {self.description}")
-        data, before = records.tobytes(), self._held
-        self._held = data, None if versions is None else versions.tobytes()
+        held = records.tobytes(), None if versions is None else versions.tobytes()
         self.records, self.versions = records, versions
-        self.buffer.write(data)
-        if self._held != before:
+        self.buffer.write(held[0])
+        if held != self._held:
             self.version = new_version()
+        self._held = held  # last: a write that is broken off is none, and must be new when it is done again
 
     def bind_uniform(self, binding: int, block: int) -> None:
         """Make block number `block` of the records visible as a uniform block."""

@@ -39,7 +39,7 @@ class SceneBuffers:
 
     def __init__(self, gpu: Gpu, scene: Scene, *, general: bool = False) -> None:
         self.gpu, g = gpu, scene.geometry
-        self._geometry = g
+        self._geometry, self._poses = g, g.poses.copy()
         uvs = g.uvs if scene.textures else None
         arrays = {"position": g.positions, "normal": g.normals, "color": g.colors, "uv": uvs}
         if general:
@@ -120,10 +120,9 @@ class SceneBuffers:
 
     def move(self, geometry: Geometry) -> None:
         """Bring moving models to where `geometry`, posed from the same rest, has them; the rest is not touched."""
-        before, self._geometry = self._geometry, geometry
-        if geometry is before:
-            return
-        for number in np.flatnonzero((geometry.poses != before.poses).any(axis=(1, 2))).tolist():
+        self._geometry = geometry
+        for number in np.flatnonzero((geometry.poses != self._poses).any(axis=(1, 2))).tolist():
+            self._poses[number] = np.nan  # as long as not all is there: a move that is broken off is done again
             vertices = geometry.moving[number].vertices
             for name, array in (("position", geometry.positions), ("normal", geometry.normals)):
                 if array is not None:
@@ -135,6 +134,7 @@ class SceneBuffers:
                 self._own.move(number, geometry.poses[number])
             for mesh in (mesh for key, mesh in self._clustered.items() if key != OWN):
                 mesh.move(number, geometry.poses[number])
+            self._poses[number] = geometry.poses[number]
 
     def _upload(self, texture: Any) -> GpuTexture:
         height, width = texture.pixels.shape[:2]

@@ -169,8 +169,9 @@ class Geometry:
         """The median of the distances of the corners of faces from the middle; the same at all times."""
         if self._rest:
             return self._rest.spread
-        away = np.linalg.norm(self._some - self.middle, axis=1)
-        return self.medians[1] if self.medians else float(np.median(away))
+        if self.medians:
+            return self.medians[1]
+        return float(np.median(np.linalg.norm(self._some - self.middle, axis=1)))
 
     @property
     def _some(self) -> Array:

@@ -93,15 +93,17 @@ class Geometry:
     def posed(self, poses: Array) -> Geometry:
         """With the moving models brought from rest by `poses` (m, 4, 4). The same object as last time if these are."""
         rest = self.rest
-        if rest._last and np.array_equal(rest._last[0].poses, poses):
-            return rest._last[0]
+        for last in rest._last[:1]:  # taken once: another thread may pose it meanwhile
+            if np.array_equal(last.poses, poses):
+                return last
         positions, normals = rest.positions.copy(), None if rest.normals is None else rest.normals.copy()
         for model, pose in zip(rest.moving, poses, strict=True):
             positions[model.vertices] = carried(rest.positions[model.vertices], pose)
             if normals is not None:
                 normals[model.vertices] = normals[model.vertices] @ pose[:3, :3].T
-        rest._last[:] = [replace(rest, positions=positions, normals=normals, _rest=rest, _poses=poses)]
-        return rest._last[0]
+        made = replace(rest, positions=positions, normals=normals, _rest=rest, _poses=poses)
+        rest._last[:] = [made]
+        return made
 
     @cached_property
     def faces_of(self) -> tuple[Ints, ...]:

@@ -96,6 +96,21 @@ def test_the_same_pose_is_the_same_object():
     assert far.at(7.0).centred.geometry is far.at(8.0).centred.geometry
 
 
+def test_a_pose_is_not_that_of_another_thread(monkeypatch):
+    """The viewer poses the scene that plays while a reference of it is traced."""
+    geometry, equal = two().geometry, np.array_equal
+    here, there = (np.stack([AROUND.matrix(time), UP.matrix(time)]) for time in (0.2, 0.9))
+    expected = geometry.posed(here)
+
+    def meanwhile(*arrays):
+        monkeypatch.undo()
+        geometry.posed(there)
+        return equal(*arrays)
+
+    monkeypatch.setattr(np, "array_equal", meanwhile)
+    assert geometry.posed(here) is expected
+
+
 def away_moving(scene: Scene, by: tuple[float, float, float]) -> Scene:
     """`scene` somewhere else, moving as it did."""
     models = tuple(

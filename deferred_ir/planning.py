@@ -11,7 +11,7 @@ from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 
 from .errors import GraphError, did_you_mean
-from .graph import Description, Facts, Graph, Plan, Step
+from .graph import FRAME_PARTS, Description, Facts, Graph, Plan, Step
 
 ANY_SCENE = Facts()
 """Of which nothing is known, so that nothing is left out."""
@@ -154,6 +154,10 @@ def _describe(graph: Graph, edges: Edges, order: list[str], faults: list[str]) -
                 faults.append(f"{name}: {error}")
                 continue
             steps[name] = step
+            unknown = sorted(work.depends() - FRAME_PARTS)
+            faults.extend(
+                f"{name}: depends(): no part of a frame is '{x}'{did_you_mean(x, FRAME_PARTS)}" for x in unknown
+            )
             both = sorted(step.outputs.keys() & work.inputs.keys())
             faults.extend(f"{name}.{port}: is an input and an output; rename one of them" for port in both)
     for name, text in graph.outputs.items():

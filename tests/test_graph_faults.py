@@ -37,6 +37,12 @@ def test_a_port_that_is_input_and_output():
     assert faults(broken) == "light.out: is an input and an output; rename one of them"
 
 
+def test_a_part_of_a_frame_that_does_not_exist():
+    work = Fake()
+    work.depends = lambda: frozenset({"camera", "lights"})
+    assert faults(graph(light=(work, {}))) == "light: depends(): no part of a frame is 'lights'; did you mean 'light'?"
+
+
 def test_a_required_input_that_is_not_connected():
     broken = graph(light=(Fake(reads("depth")), {}))
     assert faults(broken) == 'light.depth: not connected; add inputs = { depth = "pass.port" }'

@@ -69,6 +69,10 @@ def _run_stability(arguments: argparse.Namespace, settings: Mapping[str, Any], j
     stability: Any = importlib.import_module(f"{ROOM}.stability")
     cases: Any = importlib.import_module(f"{ROOM}.stability_cases").CASES
     scenes = _scenes(arguments)
+    for scene in scenes:
+        moving = ["things move; checked as it is at 0 s"] if scene.moves else []
+        for text in (*notes(scene), *moving):
+            print(f"note: {scene.name}: {text}", file=sys.stderr)
     rows = _stability(stability, cases, scenes, arguments.device)
     if json:
         write(json, {"stability": [row.as_dict() for row in rows]})

@@ -19,7 +19,7 @@ from deferred_ir.renderer import Renderer
 from deferred_ir.scene import Scene
 from deferred_ir.typing import Array
 
-from .stability_changes import same
+from .stability_changes import same, still
 from .visibility_pairs import FOLDER
 
 UNSHADOWED = FOLDER / "unshadowed.toml"
@@ -89,7 +89,8 @@ class Judge:
         self._scene: Scene | None = None
 
     def rows(self, scene: Scene, cases: Iterable[Case]) -> Iterator[Row]:
-        """Draw and judge each case in `scene`."""
+        """Draw and judge each case in `scene`, as it is at 0 s."""
+        scene = still(scene)
         if scene is not self._scene:
             self._scene, self._plain = scene, {}
         for case in cases:

@@ -18,6 +18,17 @@ def same(scene: Scene) -> Scene:
     return scene
 
 
+def still(scene: Scene) -> Scene:
+    """As it is at 0 s, without motions: they know nothing of other units and triangles. Itself where nothing moves."""
+    if not scene.moves:
+        return scene
+    held = scene.at(0.0)
+    geometry = replace(
+        scene.geometry, positions=held.geometry.positions, normals=held.geometry.normals, moving=(), medians=None
+    )
+    return replace(held, geometry=geometry, models=tuple(replace(model, motion=None) for model in scene.models))
+
+
 def vec3(values: Any) -> Vec3:
     """Three floats."""
     x, y, z = (float(value) for value in values)

@@ -195,6 +195,46 @@ def test_extreme_cases_make_a_table_and_a_status(capsys, few_cases, monkeypatch,
     assert main(["check", "cornell", "--device", "software"]) == 0
 
 
+def test_a_scene_that_moves_is_checked_as_it_is_at_0_s(capsys, monkeypatch, tmp_path):
+    """Motions overrode what cases do to camera and light, and triangles were counted against those at rest."""
+    cases = import_module("deferred_ir.profiling.stability_cases")
+    small = {"size": (16, 16), "vpls": 2}
+    names = ("scale 100, E by its square", "light within a box 0.01 wide", "slivers of 1e-6")
+    monkeypatch.setattr(cases, "CASES", [replace(cases.NAMED[name], **small) for name in names])
+    (tmp_path / "ball.obj").write_text("v -0.1 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\nf 1 2 3\nf 1 2 4\n")
+    (tmp_path / "floor.obj").write_text("v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nf 1 4 3 2\n")
+    scene = tmp_path / "moving.toml"
+    scene.write_text("""
+        [[model]]
+        path = "ball.obj"
+        [model.motion]
+        times = [0, 1]
+        translations = [[0, 0.3, 0], [0.5, 0.3, 0]]
+        rotations = [[0, 0, 0, 1], [0, 1, 0, 0]]
+        [[model]]
+        path = "floor.obj"
+        [camera]
+        position = [0, 1, 2]
+        look_at = [0, 0, 0]
+        [camera.motion]
+        times = [0, 1]
+        positions = [[0, 1, 2], [0.5, 1, 2]]
+        look_ats = [[0, 0, 0], [0, 0, 0]]
+        [spotlight]
+        position = [0, 1, 0]
+        emission = [1, 1, 1]
+        look_at = [0, 0, 0]
+        [spotlight.motion]
+        kind = "lissajous"
+        amplitude = [0.2, 0, 0.2]
+        speed = [1, 1]
+    """)
+    assert main(["check", str(scene), "--device", "software"]) == 0
+    said = capsys.readouterr()
+    assert "3 of 3 cases, 0 failed" in said.out
+    assert "note: moving: things move; checked as it is at 0 s" in said.err
+
+
 def test_a_case_that_cannot_be_drawn_fails_with_its_reason(capsys, few_cases, monkeypatch):
     broken = replace(few_cases[0], settings={"shadow_maps.budget": 1})
     monkeypatch.setattr("deferred_ir.profiling.stability_cases.CASES", (broken,))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from math import inf, isfinite
 from types import TracebackType
 from typing import Any, Literal
 
@@ -70,13 +71,14 @@ class Row:
 
     @property
     def holds(self) -> bool:
-        """Whether the figure keeps within its bound; what is not finite does not."""
-        return self.figure is not None and self.figure <= self.bound
+        """Whether the figure keeps within its bound; what is not finite does not, nor bounds anything."""
+        return self.figure is not None and self.figure <= self.bound < inf
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for JSON, which knows no infinity."""
-        finite = self.figure is not None and bool(np.isfinite(self.figure))
-        return {**asdict(self), "figure": self.figure if finite else None, "holds": self.holds}
+        figures = {"figure": self.figure, "bound": self.bound}
+        finite = {name: value if value is not None and isfinite(value) else None for name, value in figures.items()}
+        return {**asdict(self), **finite, "holds": self.holds}
 
 
 class Judge:
@@ -121,7 +123,7 @@ class Judge:
         changed = case.change(scene)
         image = self._drawn(changed, case)
         if not np.isfinite(image).all() or image.min() < 0:
-            return float("inf")
+            return inf
         if case.against == "black":
             return float(image.max())
         if case.against == "itself":
@@ -185,7 +187,7 @@ def _ratio(part: float, whole: float) -> float:
     """part / whole; where there is nothing, nothing may be wrong."""
     if whole > 0:
         return float(part / whole)
-    return 0.0 if part == 0 else float("inf")
+    return 0.0 if part == 0 else inf
 
 
 def heading(width: int) -> str:

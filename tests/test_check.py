@@ -235,6 +235,17 @@ def test_a_scene_that_moves_is_checked_as_it_is_at_0_s(capsys, monkeypatch, tmp_
     assert "note: moving: things move; checked as it is at 0 s" in said.err
 
 
+def test_what_is_not_finite_bounds_nothing(capsys, few_cases, monkeypatch, tmp_path):
+    """A picture of the scene itself that is no picture must not let all others pass."""
+    path, rays = tmp_path / "f.json", replace(few_cases[0], against="rays", slack=2.0)
+    monkeypatch.setattr("deferred_ir.profiling.stability_cases.CASES", (rays,))
+    monkeypatch.setattr("deferred_ir.profiling.stability.Judge.usual", lambda *_: float("inf"))
+    assert main(["check", "cornell", "--device", "software", "--json", str(path)]) == 1
+    assert "FAILS" in capsys.readouterr().out.splitlines()[1]
+    (row,) = json.loads(path.read_text())["stability"]
+    assert (row["bound"], row["holds"]) == (None, False)
+
+
 def test_a_case_that_cannot_be_drawn_fails_with_its_reason(capsys, few_cases, monkeypatch):
     broken = replace(few_cases[0], settings={"shadow_maps.budget": 1})
     monkeypatch.setattr("deferred_ir.profiling.stability_cases.CASES", (broken,))

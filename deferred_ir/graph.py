@@ -182,7 +182,7 @@ class Pass:
         return ()
 
     def execute(self, frame: Any, io: Any) -> None:
-        """Do the work of one frame: `frame` is an executor.Frame, `io` an executor.Io with the pass's ports."""
+        """Do the work of one frame: `frame` is a frame.Frame, `io` an io.Io with the pass's ports."""
         raise NotImplementedError
 
 

@@ -165,7 +165,8 @@ class Judge:
         renderer.reset()  # `incremental` keeps lights
         radiance = renderer.render(scene, vpls=case.vpls).radiance
         assert radiance is not None
-        return radiance.astype(np.float64)
+        drawn: Array = radiance.astype(np.float64)
+        return drawn
 
     def _renderer(self, graph: str) -> Renderer:
         if graph not in self._renderers:

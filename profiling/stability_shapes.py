@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from deferred_ir.scene import Geometry, Scene
+from deferred_ir.geometry import Geometry
+from deferred_ir.scene import Scene
 from deferred_ir.typing import Array, Ints, Vec3
 
 from .stability_changes import across, vec3, wall, with_light

@@ -15,6 +15,7 @@ from deferred_ir.lights import LIGHT
 from deferred_ir.loading import load
 from deferred_ir.viewer import frames as local_frames
 from deferred_ir.viewer import panel as panels
+from deferred_ir.viewer import saving
 
 
 def test_a_parameter_rebuilds_nothing_and_runs_only_what_reads_it(viewer):
@@ -248,6 +249,12 @@ def test_a_second_picture_gets_a_name_of_its_own(viewer, tmp_path, monkeypatch):
     act(viewer, "key", "ctrl+s")
     act(viewer, "key", "ctrl+s")
     assert sorted(path.name for path in tmp_path.glob("*.toml")) == ["cornell-1.toml", "cornell-2.toml"]
+
+
+def test_a_name_with_brackets_is_not_written_over(tmp_path):
+    """To a search for files they are a pattern."""
+    (tmp_path / "hall[2]-1.png").touch()
+    assert saving._free(tmp_path, "hall[2]") == "hall[2]-2"
 
 
 def test_a_recorded_way_is_saved_and_plays(viewer, tmp_path, monkeypatch):

@@ -6,6 +6,7 @@ A graph that is no built-in one is written, too, whole and with the settings in 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from glob import escape
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,7 @@ def _write(target: Path, tables: Mapping[str, Any], comment: str = "") -> None:
 
 def _free(folder: Path, name: str) -> str:
     stems = (f"{name}-{number}" for number in range(1, 100000))
-    found = next((stem for stem in stems if not any(folder.glob(f"{stem}[.-]*"))), None)
+    found = next((stem for stem in stems if not any(folder.glob(f"{escape(stem)}[.-]*"))), None)
     if found is None:
         raise OutputError(f"{folder}: holds too many pictures of {name}; move some away")
     return found

@@ -14,6 +14,8 @@ LARGEST = 1e18
 """Larger numbers are refused: their squares would overflow 32-bit floats."""
 MOST = 20
 """Faults that one message lists."""
+EXAMPLES = {2: "[0.0, 0.0]", 3: "[0.0, 0.0, 0.0]", 4: "[0, 0, 0, 1]"}
+"""Vectors to show, by length; four numbers are a quaternion, of which zeros are none."""
 
 DEEPEST = 32
 """Most levels of tables and arrays in a file; Python's own functions on nested values end at some hundreds."""
@@ -64,12 +66,12 @@ class Table:
         """Note a fault of `key`."""
         self.faults.add(f"{self.name}.{key}" if self.name else key, what)
 
-    def _missing(self, key: str, needed: bool) -> bool:
-        """Whether the file lacks `key`; a fault where it is needed."""
+    def _missing(self, key: str, needed: bool, mend: str = "") -> bool:
+        """Whether the file lacks `key`; a fault where it is needed, with what to give."""
         if key in self.data:
             return False
         if needed:
-            self.fault(key, "missing")
+            self.fault(key, f"missing; give {mend}" if mend else "missing")
         return True
 
     def table(self, key: str, known: tuple[str, ...]) -> Table | None:
@@ -82,9 +84,9 @@ class Table:
             return None
         return Table(self.faults, f"{self.name}.{key}" if self.name else key, value, known)
 
-    def string(self, key: str, needed: bool = False) -> str | None:
-        """A string that is not empty."""
-        if self._missing(key, needed):
+    def string(self, key: str, needed: bool = False, mend: str = "") -> str | None:
+        """A string that is not empty; mend: what to give where it is missing."""
+        if self._missing(key, needed, mend):
             return None
         value = self.data[key]
         if not isinstance(value, str) or not value.strip():
@@ -114,7 +116,7 @@ class Table:
 
     def vector(self, key: str, length: int = 3, needed: bool = True) -> tuple[float, ...] | None:
         """`length` finite numbers."""
-        if self._missing(key, needed):
+        if self._missing(key, needed, f"{length} numbers such as {EXAMPLES[length]}"):
             return None
         value = vector(self.data[key], length)
         if isinstance(value, str):
@@ -129,10 +131,13 @@ class Table:
 
     def times(self) -> tuple[float, ...] | None:
         """The array `times` of a motion: at least one finite number, ascending."""
-        if self._missing("times", needed=True):
+        if self._missing("times", needed=True, mend="seconds such as [0, 2]"):
             return None
         raw = self.data["times"]
         times = vector(raw, len(raw) if isinstance(raw, list) else 1)
+        if isinstance(times, str) and isinstance(raw, list):
+            self.fault("times", times)
+            return None
         if isinstance(times, str) or not times:
             self.fault("times", f"must be an array of numbers such as [0, 2], not {shown(raw)}")
             return None
@@ -143,7 +148,7 @@ class Table:
 
     def vectors(self, key: str, length: int, times: tuple[float, ...] | None) -> list[tuple[float, ...]] | None:
         """An array of vectors, one for each of `times`."""
-        if self._missing(key, needed=True):
+        if self._missing(key, needed=True, mend=f"one for each time, such as {EXAMPLES[length]}"):
             return None
         raw = self.data[key]
         if not isinstance(raw, list):
@@ -180,9 +185,8 @@ def number(value: Any) -> float | str:
 
 def vector(value: Any, length: int) -> tuple[float, ...] | str:
     """`value` as `length` floats, or what is wrong with it."""
-    example = ", ".join(["0.0"] * length)
     if not isinstance(value, list) or len(value) != length:
-        return f"must be {length} numbers such as [{example}], not {shown(value)}"
+        return f"must be {length} numbers such as {EXAMPLES[length]}, not {shown(value)}"
     result = []
     for item in value:
         checked = number(item)

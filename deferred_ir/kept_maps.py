@@ -79,7 +79,7 @@ class KeptMaps:
             if not lit:
                 told.append({**parts[place], "state": "left out", "why": "it lights nothing that is seen"})
             elif self.versions is None:
-                told.append(parts[place])
+                told.append({**parts[place], "why": "every frame redoes everything"})
             elif dirty:
                 told.append({**parts[place], "state": "dirty", "why": "its light is new, or it or a model has moved"})
             else:

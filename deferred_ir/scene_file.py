@@ -86,7 +86,7 @@ def _models(root: Table, folder: Path) -> tuple[ModelEntry, ...]:
     for index, entry in enumerate(entries):
         name = "model" if len(entries) == 1 else f"model[{index}]"
         table = Table(root.faults, name, entry, ("path", "scale", "translate", "motion"))
-        path = table.string("path", needed=True)
+        path = table.string("path", needed=True, mend="the model's file")
         scale = table.number("scale", 1.0)
         if scale <= 0:
             table.fault("scale", f"must be above 0, not {scale}")
@@ -162,7 +162,7 @@ def _spotlight(root: Table) -> Spotlight | None:
 
 def _spotlight_motion(spotlight: Table) -> SpotlightMotion | None:
     table = spotlight.table("motion", ("kind", "amplitude", "speed", "times", "positions", "look_ats"))
-    kind = table.string("kind", needed=True) if table else None
+    kind = table.string("kind", needed=True, mend=f"one of {', '.join(KINDS)}") if table else None
     if table is None or kind is None:
         return None
     own = {"lissajous": ("amplitude", "speed"), "keyframes": ("times", "positions", "look_ats")}

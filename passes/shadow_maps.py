@@ -65,7 +65,7 @@ class ShadowMaps(Pass):
         self, inputs: Mapping[str, Description | None], ports: Mapping[str, Any] = NO_PORTS
     ) -> Sequence[Mapping[str, Any]]:
         """A sub-pass for each light that the buffer can hold; after a frame, for each that it holds."""
-        per_layer, why = self._tiles_per_layer(), "every frame redoes everything"
+        per_layer, why = self._tiles_per_layer(), "no frame has drawn it yet"
         spot = {"light": "spotlight", "projection": "perspective", "layer": 0, "tile": 0, "size": self.params.spot_size}
         tiles = [
             {"light": f"vpl {i}", "projection": self.params.projection, "layer": 1 + i // per_layer}

@@ -128,6 +128,7 @@ def test_run_json_holds_what_the_contract_promises(tmp_path):
     assert sorted(names) == ["gbuffer", "lighting", "shadow_maps", "tonemap", "vpl"]
     maps = next(entry for entry in run["passes"] if entry["name"] == "shadow_maps")
     assert [sub["state"] for sub in maps["subpasses"]] == ["dirty"] * (run["vpls_alive"] + 1)
+    assert {sub["why"] for sub in maps["subpasses"]} == {"every frame redoes everything"}
     assert all(len(run[key]) == 16 for key in ("scene_hash", "graph_hash"))
 
 

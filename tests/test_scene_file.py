@@ -140,14 +140,14 @@ CASES = {
     "unknown key": (CAMERA + "fow = 60", "camera.fow: unknown key; did you mean 'fov'?"),
     "unknown key with a line break": ('"a\\nb" = 1', "a b: unknown key"),
     "unknown key of a model": (MODEL + "size = 2", "model[1].size: unknown key; known: motion, path, scale, translate"),
-    "no path": ("[[model]]", "model[1].path: missing"),
+    "no path": ("[[model]]", "model[1].path: missing; give the model's file"),
     "path of a wrong type": ("[[model]]\npath = 3", "model[1].path: must be a string"),
     "name of a wrong type": ("name = 3", 'name: must be a string such as "name", not 3'),
     "scale 0": (MODEL + "scale = 0", "model[1].scale: must be above 0, not 0.0"),
     "negative scale": (MODEL + "scale = -1", "model[1].scale: must be above 0"),
     "infinite scale": (MODEL + "scale = inf", "model[1].scale: must be finite, not inf"),
     "camera as a number": ("camera = 3", "camera: must be a table, not 3"),
-    "no look_at": ("[camera]\nposition = [0, 0, 0]", "camera.look_at: missing"),
+    "no look_at": ("[camera]\nposition = [0, 0, 0]", "camera.look_at: missing; give 3 numbers such as [0.0, 0.0, 0.0]"),
     "position of a wrong type": ("[camera]\nposition = 'here'", "camera.position: must be 3 numbers such as"),
     "two numbers": ("[camera]\nposition = [0, 1]", "camera.position: must be 3 numbers such as [0.0, 0.0, 0.0]"),
     "text in numbers": ("[camera]\nposition = [0, '1', 2]", "camera.position: must be a number, not '1'"),
@@ -175,7 +175,10 @@ CASES = {
         CAMERA + "[camera.motion]\ntimes = [1, 1]\npositions = [[0,0,0],[0,0,0]]\nlook_ats = [[1,0,0],[1,0,0]]",
         "camera.motion.times: must be ascending",
     ),
-    "no times": (CAMERA + "[camera.motion]\npositions = []\nlook_ats = []", "camera.motion.times: missing"),
+    "no times": (
+        CAMERA + "[camera.motion]\npositions = []\nlook_ats = []",
+        "camera.motion.times: missing; give seconds such as [0, 2]",
+    ),
     "empty times": (CAMERA + "[camera.motion]\ntimes = []\npositions = []\nlook_ats = []", "camera.motion.times: must"),
     "lengths differ": (
         CAMERA + "[camera.motion]\ntimes = [0, 1]\npositions = [[0,0,0]]\nlook_ats = [[1,0,0],[1,0,0]]",
@@ -193,7 +196,22 @@ CASES = {
         SPOTLIGHT + "[spotlight.motion]\nkind = 'lissajus'",
         "spotlight.motion.kind: unknown motion 'lissajus'; did you mean 'lissajous'?",
     ),
-    "motion without a kind": (SPOTLIGHT + "[spotlight.motion]\nspeed = [1, 1]", "spotlight.motion.kind: missing"),
+    "motion without a kind": (
+        SPOTLIGHT + "[spotlight.motion]\nspeed = [1, 1]",
+        "spotlight.motion.kind: missing; give one of lissajous, keyframes",
+    ),
+    "no rotations": (
+        MODEL + "[model.motion]\ntimes = [0]\ntranslations = [[0,0,0]]",
+        "model[1].motion.rotations: missing; give one for each time, such as [0, 0, 0, 1]",
+    ),
+    "rotation of three": (
+        MODEL + "[model.motion]\ntimes = [0]\ntranslations = [[0,0,0]]\nrotations = [[0,0,0]]",
+        "model[1].motion.rotations[0]: must be 4 numbers such as [0, 0, 0, 1], not",
+    ),
+    "time without an end": (
+        MODEL + "[model.motion]\ntimes = [0, inf]\ntranslations = [[0,0,0]]\nrotations = [[0,0,0,1]]",
+        "model[1].motion.times: must be finite, not inf",
+    ),
     "key of the other kind": (
         SPOTLIGHT + "[spotlight.motion]\nkind = 'lissajous'\namplitude = [1,1,1]\nspeed = [1,1]\ntimes = [0]",
         'spotlight.motion.times: does not belong to kind = "lissajous"',

@@ -163,7 +163,7 @@ def test_each_light_has_a_sub_pass_with_its_place(renderer):
         "tile": 0,
         "size": 2048,
         "state": "dirty",
-        "why": "every frame redoes everything",
+        "why": "no frame has drawn it yet",
     }
     assert (parts[65]["light"], parts[65]["layer"], parts[65]["tile"]) == ("vpl 64", 2, 0)
     assert len({(part["layer"], part["tile"]) for part in parts}) == 71

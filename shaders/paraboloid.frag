@@ -23,8 +23,9 @@ void main() {
     vec2 p = part.ndc * light.curve * light.tan_half;
     vec3 inside = max(direction * part.edges, vec3(p, 1.0) * part.chords);
     bool outside = any(lessThan(inside, vec3(-part.gap)));
-    if (outside || direction.z <= depth) discard;  // or closer than the near plane
-    gl_FragDepth = depth;
+    // No near plane: where a wall beside the light stands on the light's own, that would cut off its foot.
+    if (outside || direction.z <= 0.0) discard;
+    gl_FragDepth = min(depth, 1.0);
 }
 #elif STRAIGHT
 void main() {

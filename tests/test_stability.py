@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fixed_lights import lit_by, spot_record, vpl_records
 from small_scenes import box, build, room
 
 from deferred_ir.lights import Spotlight
@@ -27,6 +28,25 @@ def test_vpls_beside_an_edge_do_not_shine_through_the_other_wall(renderer, graph
     assert one.render(scene).radiance.max() == 0
     inside = replace(scene, camera=replace(scene.camera, position=(0.0, 0.0, 0.012), look_at=(0.0, 0.0, 0.0)))
     assert np.all(one.render(inside).radiance.max(axis=-1) > 0)
+
+
+def test_paraboloid_maps_show_the_foot_of_a_wall_beside_a_vpl(renderer, tmp_path) -> None:
+    """VPLs on the floor of a closed box, millionths of the scene from one or two of its walls.
+
+    Up to the near plane, which at such a distance is an angle that counts, walls were cut away, and VPLs shone through.
+    """
+    half, diagonal = 0.015, 2 * 3**0.5
+    scene = build(box((-1, -1, -1), (1, 1, 1)), box((-half,) * 3, (half,) * 3), camera=room().camera)
+    away = np.array([3e-7, 1e-6, 3e-6, 1e-5]) * diagonal
+    place = np.full((len(away), 3), 5e-7 * diagonal - half)
+    place[:, 0] = away - half
+    corners = np.concatenate([place, place])
+    corners[: len(away), 2], corners[len(away) :, 2] = 0.3 * half, away - half
+    vpls = vpl_records(corners, np.tile((0.0, 1.0, 0.0), (len(corners), 1)), np.ones((len(corners), 3)), fov=179.9)
+    records = np.concatenate([spot_record(scene, (0.0, 0.0, 0.0)), vpls])
+    settings = {"shadow_maps.projection": "paraboloid", "shadow_maps.vpl_size": 64, "shadow_maps.spot_size": 64}
+    one = lit_by(renderer, tmp_path, records, (64, 64), "deferred", set=settings)
+    assert one.render(scene).radiance.max() == 0
 
 
 @pytest.mark.parametrize("fov", [100.0, 170.0])

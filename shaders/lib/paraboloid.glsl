@@ -6,7 +6,7 @@
 #include "lib/atlas.glsl"
 #endif
 
-// Cosine: parts of triangles are cut off this far behind the hemisphere's rim; fragments are cut at the near plane.
+// Cosine: parts of triangles are cut off this far behind the hemisphere's rim; fragments are cut at the rim itself.
 const float RIM = -0.3;
 
 #if LAYER_FROM_VERTEX

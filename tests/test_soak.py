@@ -31,6 +31,7 @@ def test_objects_are_counted_by_opengl(gpu):
 
 def test_two_rounds_leave_nothing_behind(monkeypatch, capsys):
     monkeypatch.setattr(soak, "STRETCH", 2)
+    monkeypatch.setattr(soak, "SLACK", 64)  # of all that other tests have left behind
     frames = 2 * 2 * ROUND
     monkeypatch.setattr(sys, "argv", ["soak", "--frames", str(frames), "--loads", "8"])
     status = soak.main()

@@ -52,11 +52,9 @@ void main() {
 #if HAS_NEAR_FIELD
     if (first == 1) irradiance += texelFetch(near_field, pixel, 0).rgb;
 #endif
-#if !HAS_INDIRECT
     for (int i = first; i < count; ++i)
         irradiance += vpl_irradiance(lights[i], position, normal, shading_normal)
                     * VPL_VISIBILITY(lights[i]);
-#endif
 #endif
     radiance = vec4(texelFetch(albedo, pixel, 0).rgb * irradiance * INVERSE_PI, 1.0);
 }

@@ -108,7 +108,10 @@ void main() {
         chords[i] = beyond ? line(to_frame * units[i], to_frame * units[next]) : vec3(0.0, 0.0, -1.0);
         if (square > longest) {
             longest = square;
-            bool narrow = abs(dot(side, units[(i + 2) % 3])) < NARROW * texel;
+            vec3 third = units[(i + 2) % 3];
+            // Across the light from the longest side it is the third corner of what lies low over all of the map.
+            bool opposite = dot(third, units[i] + units[next]) < 0.0;
+            bool narrow = !opposite && abs(dot(side, third)) < NARROW * texel;
             depths = narrow ? plane_along(triangle[i], triangle[next]) : normal / h;
             gap = narrow ? 0.0 : GAP * texel;  // else a needle would be as wide
         }

@@ -49,6 +49,17 @@ def test_paraboloid_maps_show_the_foot_of_a_wall_beside_a_vpl(renderer, tmp_path
     assert one.render(scene).radiance.max() == 0
 
 
+def test_paraboloid_maps_show_a_low_ceiling(renderer, tmp_path) -> None:
+    """3000 times as wide as it is high above the VPL, all of its corners are at the map's rim, but it is no needle."""
+    low = 3e-4
+    scene = build(box((-1, -1, -1), (1, 1, 1)), box((-0.5, 0, -0.5), (0.5, low, 0.5)), camera=room().camera)
+    vpls = vpl_records([(0.1, 2e-6, 0.2), (0.3, 2e-6, 0.1)], [(0, 1, 0)] * 2, np.ones((2, 3)), fov=179.9)
+    records = np.concatenate([spot_record(scene, (0.0, 0.0, 0.0)), vpls])
+    settings = {"shadow_maps.projection": "paraboloid", "shadow_maps.vpl_size": 64, "shadow_maps.spot_size": 64}
+    one = lit_by(renderer, tmp_path, records, (64, 64), "deferred", set=settings)
+    assert one.render(scene).radiance.max() == 0
+
+
 @pytest.mark.parametrize("fov", [100.0, 170.0])
 def test_a_spotlight_in_a_wall_shines(renderer, fov: float) -> None:
     """Roundings put the wall, askew, before the light or behind it."""

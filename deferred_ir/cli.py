@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import math
 import os
 import sys
@@ -28,6 +29,8 @@ class Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status."""
     arguments = _parser().parse_args(argv)
+    if logging.lastResort:  # what writes warnings where no program has set up logging
+        logging.lastResort.setFormatter(logging.Formatter("note: %(message)s"))
     try:
         with interrupts.patient():
             status: int = arguments.run(arguments)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,15 +56,19 @@ def render(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
         if record:
             renderer.draw(scene, plan, seed=seed)  # compiles, allocates: not what a frame costs
             renderer.reset()
-        black = bool(outputs)
-        for picture in _pictures(renderer, scene, plan, arguments, seed=seed, record=record):
-            last = picture.interrupted or picture.number == arguments.frames - 1
-            due = [name for name in outputs if last or _NUMBER.search(name)]
-            if due:
-                image = picture.image or renderer.read(plan)
-                black = black and not any(part.any() for part in (image.radiance, image.display) if part is not None)
-                for name in due:
-                    image.save(_numbered(name, picture.number))
+        black, saved = bool(outputs), 0
+        try:
+            for picture in _pictures(renderer, scene, plan, arguments, seed=seed, record=record):
+                last = picture.interrupted or picture.number == arguments.frames - 1
+                due = [name for name in outputs if last or _NUMBER.search(name)]
+                if due:
+                    black = _save(renderer, plan, picture, due) and black
+                    saved = picture.number + 1
+        except KeyboardInterrupt:
+            if not saved:
+                raise
+            print(f"deferred-ir: interrupted: wrote {saved} of {arguments.frames} frames", file=sys.stderr)
+            return 130
         if json and record:
             renderer.finish(record)
             made = run_record(
@@ -96,6 +100,14 @@ class _Picture:
     averaged: int = 1
     image: Image | None = None
     interrupted: bool = False
+
+
+def _save(renderer: Renderer, plan: Plan, picture: _Picture, names: Sequence[str]) -> bool:
+    """Write a picture under all `names`; whether it is black."""
+    image = picture.image or renderer.read(plan)
+    for name in names:
+        image.save(_numbered(name, picture.number))
+    return not any(part.any() for part in (image.radiance, image.display) if part is not None)
 
 
 def _pictures(

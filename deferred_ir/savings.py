@@ -54,8 +54,8 @@ def of_frames(renderer: Renderer, plan: Plan, record: Record) -> list[LeftOut]:
     if dropped := last.get("lights_dropped", 0):
         found.append(LeftOut(f"maps of {dropped} lights", "they light nothing that is seen"))
     if skipped := last.get("lights_skipped", 0):
-        why = "that tile of the screen lies behind the light, or outside its cone"
-        found.append(LeftOut(f"{skipped} lights of a tile", why))
+        why = "the tile of the screen lies behind the light, or outside its cone"
+        found.append(LeftOut(f"{skipped} pairs of tile and light", why))
     if renderer.embree_seconds == 0:
         found.append(LeftOut("Embree's scene", "no ray was traced"))
     for step in plan.steps:

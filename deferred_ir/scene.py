@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from .camera import Camera, view_fault
-from .errors import SceneError
+from .errors import SceneError, SettingError
 from .geometry import Geometry, Model
 from .graph import Facts
 from .lights import Spotlight
@@ -119,8 +120,10 @@ class Scene:
         """The scene at `time` seconds, at rest there; itself where nothing moves.
 
         At times between which no model moves geometry is the same object. SceneError if camera or spotlight meet what
-        they look at.
+        they look at, SettingError if the time is not finite.
         """
+        if not isfinite(time):
+            raise SettingError(f"time {time}: must be finite, in seconds")
         geometry = self.geometry.at(time)
         if geometry is self.geometry and self.camera.motion is None and self.spotlight.motion is None:
             return self

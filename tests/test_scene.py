@@ -10,7 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small_scenes import GREY, Mesh, box, build, plane, room, textured
 
+from deferred_ir.errors import SettingError
 from deferred_ir.graph import Facts
+from deferred_ir.loading import load
 from deferred_ir.motion import LissajousMotion, ModelMotion
 from deferred_ir.scene import Geometry
 
@@ -98,3 +100,9 @@ def test_the_hash_changes_with_everything_that_a_picture_depends_on():
     hashes = {name: scene.hash for name, scene in changed().items()}
     hashes["nothing"] = base_scene().hash
     assert len(set(hashes.values())) == len(hashes)
+
+
+@pytest.mark.parametrize("time", [float("nan"), float("inf")])
+def test_a_time_is_finite(time: float) -> None:
+    with pytest.raises(SettingError, match="must be finite"):
+        load("cornell").at(time)

@@ -6,13 +6,14 @@ import json
 from dataclasses import replace
 from typing import Any, ClassVar
 
+import moderngl
 import numpy as np
 import pytest
 from small_scenes import build, plane, room
 
 from deferred_ir import cli
 from deferred_ir.frame import Frame
-from deferred_ir.gl.resources import GpuBuffer
+from deferred_ir.gl.resources import GpuBuffer, GpuTexture
 from deferred_ir.graph import FRAME_PARTS
 
 SIZE = (32, 24)
@@ -105,6 +106,57 @@ def test_a_light_that_moves_uploads_no_vertices(renderer, monkeypatch):
     monkeypatch.setattr(kept, "_attributes", dict.fromkeys(kept._attributes, (Broken(), "")))
     assert "shadow_maps" in drawn(one, LIGHT)
     assert one._buffers is kept
+
+
+class Work:
+    """Counts what OpenGL is asked for while it is on: draws, uploads, objects and programs that are new."""
+
+    def __init__(self, one, monkeypatch):
+        self.one, self.settings, self.draws, self.uploads = one, SETTINGS, 0, 0
+        self._patch(monkeypatch, moderngl.VertexArray, "render", "draws")
+        self._patch(monkeypatch, moderngl.VertexArray, "render_indirect", "draws")
+        self._patch(monkeypatch, moderngl.Buffer, "write", "uploads")
+        self._patch(monkeypatch, GpuTexture, "upload", "uploads")
+
+    def _patch(self, monkeypatch, kind, name, counter):
+        original = getattr(kind, name)
+
+        def counted(*arguments, **options):
+            setattr(self, counter, getattr(self, counter) + 1)
+            return original(*arguments, **options)
+
+        monkeypatch.setattr(kind, name, counted)
+
+    def of(self, scene, settings):
+        """(draws, uploads, new objects) of a frame; programs are objects, too."""
+        with self.one.gpu.ctx:
+            before = self.one.gpu.gl.objects()
+        if settings != self.settings:
+            self.one.configure(set=settings)
+            self.settings = settings
+        self.draws = self.uploads = 0
+        drawn(self.one, scene)
+        with self.one.gpu.ctx:
+            after = self.one.gpu.gl.objects()
+        return (
+            self.draws,
+            self.uploads,
+            {kind: after[kind] - before[kind] for kind in after if after[kind] > before[kind]},
+        )
+
+
+def test_each_change_costs_what_it_must(renderer, monkeypatch):
+    one = settled(renderer(SIZE, set=SETTINGS, reuse=True))
+    work, exposed = Work(one, monkeypatch), {**SETTINGS, "tonemap.exposure": 1.0}
+    work.of(ROOM, exposed)  # the curve of this exposure is another program, once
+    work.of(CAMERA, exposed)
+    # Uploads: the frame's uniforms always; for lighting the lists of tiles; of lights they, and what maps' draws read.
+    for scene, expected in ((CAMERA, (3, 2)), (LIGHT, (3, 5)), (BRIGHTER, (2, 3))):
+        work.of(ROOM, exposed)
+        assert work.of(ROOM, exposed) == (0, 1, {})
+        assert work.of(scene, exposed) == (*expected, {})
+    work.of(BRIGHTER, SETTINGS)
+    assert work.of(BRIGHTER, exposed) == (1, 1, {})
 
 
 def changes():

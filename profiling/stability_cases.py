@@ -98,8 +98,8 @@ LIGHT = (
 TRIANGLES = (
     Case("two walls closer than a texel", partial(shape.thin_walls, apart=1e-4), slack=SAME),
     Case("slivers of 1e-6", partial(shape.split, share=1e-6), "itself", bound=MOVED),
-    Case("triangles that are points and lines", shape.degenerate, "itself"),
-    Case("each face twice", shape.doubled, "itself"),
+    Case("triangles that are points and lines", shape.degenerate, "itself", bound=ROUNDED),
+    Case("each face twice", shape.doubled, "itself", bound=ROUNDED),
     Case("each face twice, once from behind", partial(shape.doubled, turned=True), "itself", bound=MOVED),
     Case("each face and its parts, coplanar", partial(shape.split, share=0.3, whole=True), "itself", bound=MOVED),
     *(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from typing import Any
+from unittest import mock
 
 import hypothesis
 import pytest
@@ -65,10 +66,14 @@ def renderer() -> Iterator[Callable[..., Renderer]]:
 @pytest.fixture(scope="session")
 def screen() -> Iterator[str]:
     """A virtual display of this process's own."""
+    import glfw
     from virtual_display import display
 
     with display() as name:
-        yield name
+        # Whoever ends GLFW, be it the doctor, closes the windows of all others.
+        with mock.patch.object(glfw, "terminate"):
+            yield name
+        glfw.terminate()
 
 
 @pytest.fixture(scope="session")

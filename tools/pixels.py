@@ -1,0 +1,246 @@
+"""Proves that a refactoring changes no pixel: `python tools/pixels.py [SCENE ...]`, or `make pixels`.
+
+Renders the built-in scenes, and any scene files that are named, with every graph: several seeds, bounces, soft shadows,
+wide lights, moving lights and models, reused frames, and the parameters that choose other code. The first run keeps
+hashes and pixels in out/pixels; later runs are held against them, and exit with 1 if one differs, with how much.
+`--keep` keeps anew. Pictures depend on the driver, so what is kept is never committed.
+
+It uses the public interface only, so an older checkout can run it as well: `PYTHONPATH` or another environment's Python.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import subprocess
+import sys
+import tempfile
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+ROOT = Path(__file__).resolve().parent.parent
+SIZE = (96, 64)
+VPLS = 32
+GRAPHS = ("forward", "deferred", "hemisphere", "interleaved", "accurate", "incremental")
+SCENES = ("cornell", "atrium", "colors")
+
+BOX = "v -1 -1 -1\nv 1 -1 -1\nv -1 1 -1\nv 1 1 -1\nv -1 -1 1\nv 1 -1 1\nv -1 1 1\nv 1 1 1\n"
+FACES = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
+ROOM = """
+[[model]]
+path = "box.obj"
+{model}
+[camera]
+position = [0.1, 0.2, 0.95]
+look_at = [0, -0.2, -0.5]
+fov = 75
+{camera}
+[spotlight]
+position = [-0.4, 0.9, 0.3]
+look_at = [0.1, -1, -0.1]
+emission = [3, 2.5, 2]
+{light}
+"""
+BLOCK = """
+[[model]]
+path = "box.obj"
+scale = 0.25
+translate = [0.1, -0.75, -0.2]
+"""
+MOVING = """
+[[model]]
+path = "box.obj"
+scale = 0.2
+[model.motion]
+times = [0, 1]
+translations = [[-0.3, -0.8, -0.3], [0.4, -0.5, 0.1]]
+rotations = [[0, 0, 0, 1], [0, 0.48, 0, 0.877]]
+"""
+CAMERA = """
+[camera.motion]
+times = [0, 1]
+positions = [[0.1, 0.2, 0.95], [0.3, 0.1, 0.9]]
+look_ats = [[0, -0.2, -0.5], [0.1, -0.2, -0.5]]
+"""
+LISSAJOUS = """
+[spotlight.motion]
+kind = "lissajous"
+amplitude = [0.2, 0.02, 0.2]
+speed = [2, 3]
+"""
+WRITTEN = {
+    "room": ROOM.format(model=BLOCK, camera="", light="fov = 90"),
+    "soft": ROOM.format(model=BLOCK, camera="", light="fov = 90\nradius = 0.08"),
+    "wide": ROOM.format(model=BLOCK, camera="", light="fov = 165"),
+    "wide soft": ROOM.format(model=BLOCK, camera="", light="fov = 165\nradius = 0.08"),
+    "dark": ROOM.format(model=BLOCK, camera="", light="fov = 90").replace("[3, 2.5, 2]", "[0, 0, 0]"),
+    "models move": ROOM.format(model=MOVING + BLOCK, camera="", light="fov = 90"),
+    "light moves": ROOM.format(model=BLOCK, camera="", light="fov = 90" + LISSAJOUS),
+    "all move": ROOM.format(model=MOVING, camera=CAMERA, light="fov = 90\nradius = 0.03" + LISSAJOUS),
+}
+"""Scenes that the tool writes itself, by name."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One picture or several: `times` and `seeds` go through the same Renderer, one after the other."""
+
+    scene: str
+    graph: str
+    set: Mapping[str, Any] = field(default_factory=dict)
+    seeds: tuple[int, ...] = (0,)
+    times: tuple[float, ...] = (0.0,)
+    vpls: int | None = VPLS
+    accumulate: int = 1
+    reuse: bool = False
+    keep_all: bool = False
+
+    @property
+    def name(self) -> str:
+        """What tells it from the others."""
+        changed = [f"{key}={value}" for key, value in self.set.items()]
+        if self.vpls != VPLS:
+            changed.append(f"vpls={self.vpls}")
+        if self.accumulate > 1:
+            changed.append(f"accumulate={self.accumulate}")
+        changed += [name for name in ("reuse", "keep_all") if getattr(self, name)]
+        return " ".join([Path(self.scene).stem, self.graph, *changed])
+
+
+def cases(extra: list[str]) -> Iterator[Case]:
+    """All that are rendered; `extra` are scene files."""
+    for scene in (*SCENES, *extra):
+        for graph in GRAPHS:
+            yield Case(scene, graph, times=(0.0,) * (3 if graph == "incremental" else 1))  # which fills up by and by
+    times = (0.0, 0.03, 0.06, 0.5, 0.5, 1.0)
+    for graph in GRAPHS:
+        yield Case("cornell", graph, seeds=(1, 7))
+        yield Case("room", graph, keep_all=True)
+        yield from (Case(scene, graph) for scene in ("soft", "wide", "wide soft", "dark"))
+        yield Case("cornell", graph, vpls=0)
+        yield Case("cornell", graph, vpls=256)
+        yield Case("all move", graph, accumulate=3)
+        for scene in ("models move", "light moves", "all move"):
+            yield Case(scene, graph, times=times)
+            yield Case(scene, graph, times=times, reuse=True)
+        for key, value in {"vpl.clamp": 0.0, "shadow_maps.spot_size": 256, "tonemap.operator": "aces"}.items():
+            yield Case("soft", graph, {key: value})
+    for graph in ("forward", "deferred", "interleaved", "accurate"):
+        yield Case("cornell", graph, {"vpl.bounces": 3})
+        yield Case("room", graph, {"vpl.candidates": 4, "vpl.pattern": "halton"})
+        maps = {"spot_kernel": 5.0, "vpl_kernel": 3.0, "spot_taps": 9, "vpl_taps": 5, "spot_offset": 1.0}
+        yield Case("room", graph, {f"shadow_maps.{key}": value for key, value in maps.items()})
+        soft = {"search_taps": 7, "soft_taps": 11, "vpl_offset": 1.5, "vpl_size": 64}
+        yield Case("soft", graph, {f"shadow_maps.{key}": value for key, value in soft.items()})
+        yield Case("wide", graph, {"shadow_maps.soft": "off", "shadow_maps.cull": "front"})
+        for key, value in {"tessellation": "pre", "bend": 0.5}.items():
+            paraboloid = {"shadow_maps.projection": "paraboloid", "vpl.fov": 179.0}
+            yield Case("cornell", graph, {**paraboloid, f"shadow_maps.{key}": value})
+        yield Case("colors", graph, {"shadow_maps.vpl_deviation": 2.0, "shadow_maps.projection": "perspective"})
+    yield Case("colors", "forward", {"forward.lights_per_draw": 4})
+    for graph in ("interleaved", "accurate"):
+        yield from (Case("cornell", graph, {"interleave.n": n}) for n in (1, 2, 8))
+        yield Case("room", graph, {"gather.angle": 60.0, "gather.fewest": 0.9})
+        yield Case("cornell", graph, {"interleave.n": 8}, seeds=(0, 1, 1), reuse=True)
+    for visibility in ("maps", "rays"):
+        yield Case("soft", "accurate", {"shadow_rays.visibility": visibility}, seeds=(0, 1, 1))
+        yield Case("cornell", "accurate", {"shadow_rays.visibility": visibility, "near_field.samples": 0.5})
+    yield Case("light moves", "incremental", {"vpl.most": 16, "vpl.least": 2}, times=times, seeds=(3,))
+    yield from (Case("colors", "deferred", {"tonemap.operator": o}) for o in ("reinhard", "none"))
+    yield Case("colors", "deferred", {"tonemap.exposure": 1.5})
+
+
+def pictures(case: Case, folder: Path) -> dict[str, np.ndarray]:
+    """What a case draws, "name of the picture" -> pixels."""
+    import deferred_ir as ir
+
+    path = folder / f"{case.scene}.toml"
+    scene = ir.load(str(path) if path.exists() else case.scene)
+    options = {"set": case.set, "reuse": case.reuse, "keep_all": case.keep_all, "device": "software"}
+    made = {}
+    with ir.Renderer(SIZE, case.graph, **options) as renderer:
+        for i, time in enumerate(case.times):
+            for j, seed in enumerate(case.seeds):
+                image = renderer.render(scene, vpls=case.vpls, seed=seed, time=time, accumulate=case.accumulate)
+                made[f"{case.name} [{i} {time:g} s, {j} seed {seed}] radiance"] = image.radiance
+                made[f"{case.name} [{i} {time:g} s, {j} seed {seed}] display"] = image.display
+    return made
+
+
+def references(folder: Path) -> Iterator[tuple[str, np.ndarray]]:
+    """What the path tracer and the sum over VPLs with shadow rays give."""
+    for scene in ("cornell", "soft", "all move"):
+        for options in ("--spp 4", "--spp 4 --bounces 2 --seed 3", "--vpls 32", "--vpls 16 --set vpl.clamp=0.1"):
+            path, out = folder / f"{scene}.toml", folder / "reference.npy"
+            arguments = ["reference", str(path) if path.exists() else scene, "-o", out, "--size", "24x16"]
+            command = [sys.executable, "-m", "deferred_ir", *arguments, *options.split()]
+            subprocess.run(command, check=True, capture_output=True)
+            yield f"reference {scene} {options}", np.load(out)
+
+
+def difference(image: np.ndarray, before: np.ndarray) -> str:
+    """How far two pictures are apart, in words."""
+    if image.shape != before.shape:
+        return f"{image.shape} instead of {before.shape}"
+    a, b = image.astype(float), before.astype(float)
+    error = ((a - b) ** 2 / (b**2 + 0.01 * b.mean() ** 2 + 1e-300)).mean()
+    return f"{int((image != before).any(axis=-1).sum())} pixels, relMSE {error:.3g}"
+
+
+def main() -> int:
+    """Exit status 0 if all pictures are as they were kept, or none were."""
+    parser = argparse.ArgumentParser(description="Renders many pictures and holds them against those kept before.")
+    parser.add_argument("scenes", nargs="*", help="scene files to render besides the built-in scenes")
+    parser.add_argument("--keep", action="store_true", help="keep these pictures, whatever was kept before")
+    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "pixels", help="where they are kept")
+    parser.add_argument("--only", default="", help="cases whose name has this in it")
+    options = parser.parse_args()
+    kept, folder = options.folder / "hashes.json", options.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    before = {} if options.keep or not kept.exists() else json.loads(kept.read_text())
+    found: dict[str, str] = {}
+    differ = []
+
+    def take(name: str, pixels: np.ndarray) -> None:
+        found[name] = hashlib.sha256(repr((pixels.dtype, pixels.shape)).encode() + pixels.tobytes()).hexdigest()[:32]
+        file = folder / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.npy"
+        if not before:
+            np.save(file, pixels)
+        elif name in before and before[name] != found[name]:
+            differ.append(f"{name}: {difference(pixels, np.load(file))}")
+            tqdm.write(differ[-1])
+
+    with tempfile.TemporaryDirectory() as text, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        written = Path(text)
+        (written / "box.obj").write_text(BOX + FACES)
+        for name, scene in WRITTEN.items():
+            (written / f"{name}.toml").write_text(scene)
+        chosen = [case for case in cases(options.scenes) if options.only in case.name]
+        for case in tqdm(chosen, desc="pixels", unit="case"):
+            for name, pixels in pictures(case, written).items():
+                take(name, pixels)
+        for name, pixels in () if options.only else references(written):
+            take(name, pixels)
+    missing = [] if options.only else sorted(before.keys() - found.keys())
+    if not before:
+        kept.write_text(json.dumps(found, indent=0))
+        print(f"{len(found)} pictures kept in {folder}; change the code and run this again")
+        return 0
+    for name in missing:
+        print(f"not drawn any more: {name}")
+    same = sum(before.get(name) == digest for name, digest in found.items())
+    new = len(found.keys() - before.keys())
+    print(f"{same} of {len(found)} pictures are the same" + (f", {new} are new" if new else ""))
+    return 1 if differ or missing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -40,7 +40,7 @@ bench: $(VENV)/installed  ## measure how far from the limits the passes are, for
 
 soak: $(VENV)/installed  ## 20,000 frames and 500 loads of scenes in one process, half an hour at most: nothing may grow
 	@$(BIN)/python tools/system.py opengl
-	@$(BIN)/python -m deferred_ir.profiling.soak
+	@$(BIN)/python -m deferred_ir.profiling.checks.soak
 
 look: $(VENV)/installed-dev  ## screenshot of a small report to out/report.png
 	@$(BIN)/python tools/system.py opengl

@@ -15,44 +15,38 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .accumulation import Accumulation
-    from .errors import DeviceError, Error, GraphError, OutputError, SceneError, SettingError, ShaderError
-    from .image import Image
-    from .loading import builtin_scenes, load
-    from .renderer import Renderer
-    from .scene import Scene
+    from deferred_ir.base.errors import DeviceError as DeviceError
+    from deferred_ir.base.errors import Error as Error
+    from deferred_ir.base.errors import GraphError as GraphError
+    from deferred_ir.base.errors import OutputError as OutputError
+    from deferred_ir.base.errors import SceneError as SceneError
+    from deferred_ir.base.errors import SettingError as SettingError
+    from deferred_ir.base.errors import ShaderError as ShaderError
+    from deferred_ir.engine.accumulation import Accumulation as Accumulation
+    from deferred_ir.engine.renderer import Renderer as Renderer
+    from deferred_ir.loading.load import builtin_scenes as builtin_scenes
+    from deferred_ir.loading.load import load as load
+    from deferred_ir.output.image import Image as Image
+    from deferred_ir.scene.scene import Scene as Scene
 
-_WHERE = {
-    "Accumulation": "accumulation",
-    "DeviceError": "errors",
-    "Error": "errors",
-    "GraphError": "errors",
-    "OutputError": "errors",
-    "SceneError": "errors",
-    "SettingError": "errors",
-    "ShaderError": "errors",
-    "Image": "image",
-    "builtin_scenes": "loading",
-    "load": "loading",
-    "Renderer": "renderer",
-    "Scene": "scene",
+_NAMES = {
+    "base.errors": (
+        "DeviceError",
+        "Error",
+        "GraphError",
+        "OutputError",
+        "SceneError",
+        "SettingError",
+        "ShaderError",
+    ),
+    "engine.accumulation": ("Accumulation",),
+    "engine.renderer": ("Renderer",),
+    "loading.load": ("builtin_scenes", "load"),
+    "output.image": ("Image",),
+    "scene.scene": ("Scene",),
 }
-
-__all__ = [
-    "Accumulation",
-    "DeviceError",
-    "Error",
-    "GraphError",
-    "Image",
-    "OutputError",
-    "Renderer",
-    "Scene",
-    "SceneError",
-    "SettingError",
-    "ShaderError",
-    "builtin_scenes",
-    "load",
-]
+_WHERE = {name: module for module, names in _NAMES.items() for name in names}
+__all__ = sorted(_WHERE)  # noqa: PLE0605
 
 
 def __getattr__(name: str) -> Any:

@@ -1,6 +1,6 @@
 """The assignment's way, kept as the baseline: the scene is drawn for each light and added up by blending.
 
-lights, depth and primitives of the prepass, a plain depth map for each light -> radiance. Positions are interpolated
+lights, depth and primitives of visible_faces, a plain depth map for each light -> radiance. Positions are interpolated
 from the vertices; nothing comes from a G-buffer.
 """
 
@@ -12,14 +12,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir import variants
-from deferred_ir.dropping import in_order, shining
-from deferred_ir.frame import Frame
-from deferred_ir.graph import Description, Input, Output, Pass, Texture
-from deferred_ir.io import Io
-from deferred_ir.lights import LIGHTS_PER_BLOCK
-from deferred_ir.params import param
-from deferred_ir.typing import Ints
+from deferred_ir.base.arrays import Ints
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.light_culling import in_order, shining
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.graph.params import param
+from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
+from deferred_ir.shadows import shader_variants
 
 FIRST_MAP = 1
 """Texture unit of the first depth map; unit 0 holds the primitives, FIRST_MAP + 1 the spotlight's once more."""
@@ -73,9 +73,9 @@ class Forward(Pass):
             io["spot"][0].bind(FIRST_MAP, compare)
         if io["blockers"]:
             io["blockers"][0].bind(FIRST_MAP + 1, io.gpu.sampler(linear=False))
-        direct = {"DIRECT": 1, **defines, **variants.of_spotlight(frame, lights.records)}
+        direct = {"DIRECT": 1, **defines, **shader_variants.of_spotlight(frame, lights.records)}
         frame.buffers.draw(io.program("forward.frag", "scene.vert", defines=direct))
-        indirect = {"DIRECT": 0, "DISC": 0, **defines, **variants.of_pixels(frame, lights.records[1:])}
+        indirect = {"DIRECT": 0, "DISC": 0, **defines, **shader_variants.of_pixels(frame, lights.records[1:])}
         program = io.program("forward.frag", "scene.vert", defines=indirect)
         for rows in _groups(lights.records, group):
             for i, tile in enumerate(lights.records["tile"][rows].astype(int) if io["vpls"] else ()):

@@ -16,14 +16,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir import variants
-from deferred_ir.dropping import last_shining
-from deferred_ir.frame import Frame
-from deferred_ir.graph import Description, Input, Output, Pass, Texture
-from deferred_ir.interleaving import share_starts
-from deferred_ir.io import Io
-from deferred_ir.params import param
-from deferred_ir.typing import Ints
+from deferred_ir.base.arrays import Ints
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.light_culling import last_shining
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.graph.params import param
+from deferred_ir.shadows import shader_variants
+from deferred_ir.vpls.shares import share_starts
 
 IRRADIANCE, THIN, COUNT, MISSING = range(4)
 """Image units that the shaders declare."""
@@ -84,7 +84,7 @@ class Gather(Pass):
         drawn = io["depth"].version, io["normals"].version
         windows = (*drawn, shares, self.params, side) if frame.reuse else None
         known = windows is not None and io["missing"].kept == windows
-        defines = variants.of_pixels(frame, vpls.records)
+        defines = shader_variants.of_pixels(frame, vpls.records)
         kept = {"SMOOTH": defines["SMOOTH"], "KEEP": int(frame.reuse), "KNOWN": int(known)}
         program = io.program("gather.frag", defines=kept)
         program.set(
@@ -99,7 +99,7 @@ class Gather(Pass):
         if io["rays"]:
             gpu.barrier()
             return
-        program = io.program("thin.frag", "thin.vert", defines=defines)
+        program = io.program("lonely_pixels/light.frag", "lonely_pixels/rows.vert", defines=defines)
         gpu.clip(1)  # to the rows that the list fills
         gpu.gl.ColorMask(0, 0, 0, 0)  # the shader stores where each pixel belongs
         block = vpls.description.block

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from deferred_ir.frame import Frame
-from deferred_ir.graph import Description, Output, Pass, Texture
-from deferred_ir.io import Io
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.graph import Description, Output, Pass, Texture
 
 
 class GBuffer(Pass):

@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from deferred_ir.errors import GraphError
-from deferred_ir.frame import Frame
-from deferred_ir.graph import Description, Facts, Output, Pass
-from deferred_ir.incremental import IncrementalVpls
-from deferred_ir.io import Io
-from deferred_ir.params import param
-from deferred_ir.vpl_buffer import VplParams, output, packed
-from deferred_ir.vpls import NONE
+from deferred_ir.base.errors import GraphError
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.light_buffer import VplParams, output, packed
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.graph import Description, Facts, Output, Pass
+from deferred_ir.graph.params import param
+from deferred_ir.vpls.cast import NONE
+from deferred_ir.vpls.keep import IncrementalVpls
 
 
 @dataclass(frozen=True)

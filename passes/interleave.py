@@ -8,13 +8,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir.dropping import in_order, shining_first
-from deferred_ir.errors import GraphError
-from deferred_ir.frame import Frame
-from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass
-from deferred_ir.interleaving import dealt, share_starts
-from deferred_ir.io import Io
-from deferred_ir.params import param
+from deferred_ir.base.errors import GraphError
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.light_culling import in_order, shining_first
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.graph import Buffer, Description, Facts, Input, Output, Pass
+from deferred_ir.graph.params import param
+from deferred_ir.vpls.shares import dealt, share_starts
 
 
 @dataclass(frozen=True)

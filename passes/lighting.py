@@ -11,14 +11,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir import variants
-from deferred_ir.dropping import last_shining
-from deferred_ir.frame import Frame
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.light_culling import last_shining
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.screen_tiles import FEWEST, Tiles, draws
 from deferred_ir.gl.shaders import Program
-from deferred_ir.graph import Description, Input, Output, Pass, Texture
-from deferred_ir.io import Io
-from deferred_ir.lights import LIGHTS_PER_BLOCK
-from deferred_ir.screen_tiles import FEWEST, Tiles, draws
+from deferred_ir.graph.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
+from deferred_ir.shadows import shader_variants
 
 
 class Lighting(Pass):
@@ -54,7 +54,7 @@ class Lighting(Pass):
         """One fullscreen draw a block of lights, or one a tile of the screen with the lights that may reach it."""
         ctx, lights = io.gpu.ctx, io["lights"]
         records = lights.records[:1] if io["indirect"] else lights.records
-        defines = variants.of_pixels(frame, lights.records[1:]) | variants.of_spotlight(frame, records)
+        defines = shader_variants.of_pixels(frame, lights.records[1:]) | shader_variants.of_spotlight(frame, records)
         program = io.program("lighting.frag", defines=defines)
         ctx.blend_func = ctx.ONE, ctx.ONE
         # A GPU would wait for the depth, and has a light's arithmetic for less than a draw.

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import ClassVar
 
-from deferred_ir.frame import Frame
-from deferred_ir.graph import Description, Facts, Input, Output, Pass, Texture
-from deferred_ir.io import Io
-from deferred_ir.near_field import VplLimits, residual
-from deferred_ir.params import param
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.graph import Description, Facts, Input, Output, Pass, Texture
+from deferred_ir.graph.params import param
+from deferred_ir.vpls.clamp_residual import VplLimits, residual
 
 
 @dataclass(frozen=True)

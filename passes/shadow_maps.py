@@ -13,13 +13,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from deferred_ir import map_meshes, paraboloid_maps
-from deferred_ir.frame import Frame
-from deferred_ir.graph import NO_PORTS, Buffer, Description, Facts, Input, Output, Pass, Texture
-from deferred_ir.io import Io
-from deferred_ir.kept_maps import KeptMaps
-from deferred_ir.lights import LIGHTS_PER_BLOCK
-from deferred_ir.maps import MapParams
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.graph import NO_PORTS, Buffer, Description, Facts, Input, Output, Pass, Texture
+from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
+from deferred_ir.shadows import mesh_choice, paraboloid
+from deferred_ir.shadows.atlas_cache import KeptMaps
+from deferred_ir.shadows.settings import MapParams
 
 
 class ShadowMaps(Pass):
@@ -80,25 +80,25 @@ class ShadowMaps(Pass):
         gpu, lights = io.gpu, io["lights"]
         kept = KeptMaps.of(io, self.params, all_tiles=frame.keep_all)
         self.params.prepare(gpu)
-        geometry = [] if gpu.layer_from_vertex else ["shadow_maps.geom"]
-        program = io.program("depth.frag", "shadow_maps.vert", *geometry)
+        geometry = [] if gpu.layer_from_vertex else ["shadow_maps/layer.geom"]
+        program = io.program("shadow_maps/depth.frag", "shadow_maps/planar.vert", *geometry)
         total = len(lights.records)
         for start in range(0, total, LIGHTS_PER_BLOCK):
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
             records = lights.records[start : min(start + LIGHTS_PER_BLOCK, total)]
             curved, dirty = self.params.paraboloid(records), kept.dirty[start : start + len(records)]
-            for mesh, share in map_meshes.shares(frame, self.params, records):
+            for mesh, share in mesh_choice.shares(frame, self.params, records):
                 drawn = share & dirty
                 if (drawn & ~curved).any():
                     gpu.clip(4)
                     planar = np.flatnonzero(drawn & ~curved)
                     mesh.draw(program, mesh.clusters.visible(records[planar]), planar)
                 if (drawn & curved).any():
-                    paraboloid_maps.draw(mesh, io, self.params, records, drawn & curved, layered=True)
+                    paraboloid.draw(mesh, io, self.params, records, drawn & curved, layered=True)
         kept.remember()
         io.count("maps_drawn", int(kept.dirty.sum()))
         if total > 1:
-            map_meshes.count(frame, io, self.params)
+            mesh_choice.count(frame, io, self.params)
 
 
 def _lights(inputs: Mapping[str, Description | None]) -> int:

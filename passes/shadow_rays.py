@@ -12,13 +12,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from deferred_ir.direct_light import on_pixels
-from deferred_ir.frame import Frame
-from deferred_ir.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
-from deferred_ir.interleaving import places, share_starts
-from deferred_ir.io import Io
-from deferred_ir.params import param
-from deferred_ir.ray_visibility import BITS, cost_of_maps, cost_of_rays, masks
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
+from deferred_ir.graph.params import param
+from deferred_ir.rays.direct import on_pixels
+from deferred_ir.vpls.ray_masks import BITS, cost_of_maps, cost_of_rays, masks
+from deferred_ir.vpls.shares import places, share_starts
 
 
 @dataclass(frozen=True)

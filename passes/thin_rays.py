@@ -12,16 +12,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir.frame import Frame
-from deferred_ir.graph import Description, Input, Output, Pass, Texture
-from deferred_ir.interleaving import share_starts
-from deferred_ir.io import Io
-from deferred_ir.parallel import in_order
-from deferred_ir.surfaces import Surfaces
-from deferred_ir.tracing import Hits, Tracer
-from deferred_ir.typing import Array, Ints
-from deferred_ir.vpl_reference import Lights, Patch
-from deferred_ir.vpls import Vpls
+from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.base.parallel import in_order
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.rays.pixel_surfaces import Surfaces
+from deferred_ir.rays.tracer import Hits, Tracer
+from deferred_ir.vpls.cast import Vpls
+from deferred_ir.vpls.shares import share_starts
+from deferred_ir.vpls.sum import Lights, Patch
 
 
 class ThinRays(Pass):

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, get_args
 
-from deferred_ir.frame import Frame
-from deferred_ir.graph import Description, Input, Output, Texture
-from deferred_ir.io import FullscreenPass
-from deferred_ir.params import param
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.pass_io import FullscreenPass
+from deferred_ir.graph.graph import Description, Input, Output, Texture
+from deferred_ir.graph.params import param
 
 Operator = Literal["neutral", "reinhard", "aces", "none"]
 
@@ -32,8 +32,8 @@ class Tonemap(FullscreenPass):
 
     Params = Params
     inputs: ClassVar[Mapping[str, Input]] = {"radiance": Input("linear radiance", format="rgba32f")}
-    fragment = "tonemap.frag"
-    vertex = "tonemap.vert"
+    fragment = "tonemap/tonemap.frag"
+    vertex = "tonemap/exposure.vert"
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Display pixels."""

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from deferred_ir.dropping import dropped, shining
-from deferred_ir.frame import Frame
-from deferred_ir.graph import Description, Facts, Output, Pass
-from deferred_ir.io import Io
-from deferred_ir.params import param
-from deferred_ir.resampling import effects, probes, resample
-from deferred_ir.sampling import Pattern, warn_unbalanced
-from deferred_ir.vpl_buffer import VplParams, map_versions, output, packed
-from deferred_ir.vpls import NONE, Vpls, cast
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.light_buffer import VplParams, map_versions, output, packed
+from deferred_ir.frame.light_culling import dropped, shining
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.graph import Description, Facts, Output, Pass
+from deferred_ir.graph.params import param
+from deferred_ir.sampling.patterns import Pattern, warn_unbalanced
+from deferred_ir.vpls.cast import NONE, Vpls, cast
+from deferred_ir.vpls.choose import effects, probes, resample
 
 
 @dataclass(frozen=True)

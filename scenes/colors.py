@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from deferred_ir.typing import Array
+from deferred_ir.base.arrays import Array
 
 WIDTH, HEIGHT, DEPTH = 5.0, 2.8, 7.5
 """Of the room, in metres. The texture covers 5 m x 5 m of the floor, so that it repeats half once more along z."""

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from deferred_ir.typing import Array, Ints
+from deferred_ir.base.arrays import Array, Ints
 
 Point = Sequence[float] | Array
 Profile = Sequence[tuple[float, float]]

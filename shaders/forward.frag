@@ -1,10 +1,10 @@
 // Radiance from the spotlight, or from LIGHTS_PER_DRAW VPLs or fewer, each with a depth map of its own; blending adds up
 // the draws.
-#include "lib/surface.glsl"
-#include "lib/light.glsl"
+#include "lib/surface/surface.glsl"
+#include "lib/lights/light.glsl"
 #if HAS_SPOT || HAS_VPLS
-#include "lib/plain.glsl"
-#include "lib/soft.glsl"
+#include "lib/shadows/single.glsl"
+#include "lib/shadows/soft.glsl"
 #endif
 
 layout(binding = UNIT_PRIMITIVES) uniform usampler2D primitives;

@@ -1,9 +1,9 @@
 // The mean irradiance of a window of INTERLEAVE^2 pixels, of those on the pixel's own surface. Which those are is found,
 // with KEEP noted in `missing` for frames that follow, or with KNOWN read from there.
-#include "lib/frame.glsl"
-#include "lib/gbuffer.glsl"
-#include "lib/interleave.glsl"
-#include "lib/thin.glsl"
+#include "lib/camera/frame.glsl"
+#include "lib/surface/gbuffer.glsl"
+#include "lib/shares/places.glsl"
+#include "lib/shares/lonely.glsl"
 
 layout(binding = UNIT_SHARES) uniform sampler2D shares;
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;

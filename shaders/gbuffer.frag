@@ -1,5 +1,5 @@
-#include "lib/surface.glsl"
-#include "lib/gbuffer.glsl"
+#include "lib/surface/surface.glsl"
+#include "lib/surface/gbuffer.glsl"
 
 // A target that nothing reads is left out.
 #ifdef TARGET_NORMALS

@@ -1,8 +1,8 @@
 // Radiance from the spotlight and one block of lights; further blocks are added by blending.
-#include "lib/frame.glsl"
-#include "lib/gbuffer.glsl"
-#include "lib/light.glsl"
-#include "lib/visibility.glsl"
+#include "lib/camera/frame.glsl"
+#include "lib/surface/gbuffer.glsl"
+#include "lib/lights/light.glsl"
+#include "lib/shadows/visibility.glsl"
 
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;

@@ -1,5 +1,5 @@
 // The scene seen by the camera.
-#include "lib/frame.glsl"
+#include "lib/camera/frame.glsl"
 
 in vec3 position;
 #if HAS_NORMALS

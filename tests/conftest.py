@@ -10,9 +10,9 @@ from unittest import mock
 import hypothesis
 import pytest
 
+from deferred_ir.engine.renderer import Renderer
+from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.debug import SWITCH
-from deferred_ir.gl.gpu import Gpu
-from deferred_ir.renderer import Renderer
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("LP_NUM_THREADS", "1")  # llvmpipe: every core has a process of tests already
@@ -84,7 +84,7 @@ def viewer_window(screen: str) -> Iterator[Any]:
 
     from deferred_ir.gl.window import Window
     from deferred_ir.viewer.app import Viewer
-    from deferred_ir.viewer.panel import WIDTH
+    from deferred_ir.viewer.panels.side_panel import WIDTH
     from deferred_ir.viewer.session import Session
 
     del screen

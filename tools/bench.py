@@ -9,7 +9,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from pages import ROOT, between
 
-from deferred_ir.profiling import bench
+from deferred_ir.profiling.limits import bench
 
 PAGE = ROOT / "docs" / "bench.md"
 BEGIN = "<!-- limits: written by tools/bench.py -->"

@@ -13,10 +13,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from pages import ROOT, between
 
-from deferred_ir import config
-from deferred_ir.graph import Facts, Step
-from deferred_ir.params import specs
-from deferred_ir.planning import compile
+from deferred_ir.graph import file
+from deferred_ir.graph.compile import compile
+from deferred_ir.graph.graph import Facts, Step
+from deferred_ir.graph.params import specs
 
 PAGE = ROOT / "docs" / "graph.md"
 BEGIN = "<!-- passes: written by tools/pass_tables.py -->"
@@ -27,8 +27,8 @@ def steps() -> dict[str, Step]:
     """For each type of pass, a step of a built-in graph that uses it."""
     found = {}
     large = Facts(triangles=100_000)  # a scene in which no pass is left out
-    for name in sorted(config.graph_names(), key=lambda name: name != "deferred"):
-        graph = config.load_graph(name)
+    for name in sorted(file.graph_names(), key=lambda name: name != "deferred"):
+        graph = file.load_graph(name)
         for step in compile(graph, list(graph.outputs), large).steps:
             kind = type(step.work).__module__.rpartition(".")[2]
             found.setdefault(kind, step)
@@ -61,7 +61,7 @@ def section(kind: str, step: Step) -> list[str]:
 def tables() -> str:
     """The whole section between the markers."""
     found = steps()
-    missing = set(config.pass_types()) - found.keys()
+    missing = set(file.pass_types()) - found.keys()
     if missing:
         raise SystemExit(f"in no built-in graph, so not shown: {', '.join(sorted(missing))}")
     return "\n".join(line for kind in sorted(found) for line in section(kind, found[kind]))

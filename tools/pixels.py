@@ -5,7 +5,7 @@ wide lights, moving lights and models, reused frames, and the parameters that ch
 hashes and pixels in out/pixels; later runs are held against them, and exit with 1 if one differs, with how much.
 `--keep` keeps anew. Pictures depend on the driver, so what is kept is never committed.
 
-It uses the public interface only, so an older checkout can run it as well: `PYTHONPATH` or another environment's Python.
+It uses the public interface only, so the environment of an older checkout can run it as well.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ PACKAGES = {
 }
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 OPEN_CONTEXT = """
-from deferred_ir.errors import Error
+from deferred_ir.base.errors import Error
 from deferred_ir.gl.devices import create_context
 try:
     create_context()

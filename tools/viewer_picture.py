@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "support"))
 
 from virtual_display import act, display, xdo
 from x_client import Client
@@ -19,8 +19,8 @@ WINDOW = 1280, 720
 def main(target: str, scale: str = "1") -> int:
     """The Cornell box with local frames and the shadow map, by the keys that a user would press."""
     from deferred_ir.gl.window import Window
-    from deferred_ir.image import Image
-    from deferred_ir.loading import load
+    from deferred_ir.loading.load import load
+    from deferred_ir.output.image import Image
     from deferred_ir.viewer.app import Viewer
     from deferred_ir.viewer.session import Session
 

@@ -7,8 +7,8 @@ import traceback
 from pathlib import Path
 from typing import Any
 
-from ..errors import DeviceError
-from . import raw
+from deferred_ir.base.errors import DeviceError
+from deferred_ir.gl import raw
 
 SWITCH = "DEFERRED_IR_DEBUG"
 """Environment variable: anything in it turns debug output on."""

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from ..errors import DeviceError, did_you_mean
+from deferred_ir.base.errors import DeviceError, did_you_mean
 
 if TYPE_CHECKING:
     import moderngl

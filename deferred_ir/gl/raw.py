@@ -7,11 +7,11 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from ..errors import DeviceError
-from .devices import Loader
+from deferred_ir.base.errors import DeviceError
+from deferred_ir.gl.devices import Loader
 
 if TYPE_CHECKING:
-    from .debug import DebugOutput
+    from deferred_ir.gl.debug import DebugOutput
 
 _U, _I, _F, _P = ctypes.c_uint, ctypes.c_int, ctypes.c_float, ctypes.c_void_p
 KINDS = "Texture", "Buffer", "Program", "VertexArray", "Framebuffer", "Sampler", "Query"

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import ShaderError, did_you_mean
-from .gpu import Gpu
+from deferred_ir.base.errors import ShaderError, did_you_mean
+from deferred_ir.gl.context import Gpu
 
 VERSION = "#version 430 core"
 STAGES = {

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from . import raw
-from .gpu import Gpu
+from deferred_ir.gl import raw
+from deferred_ir.gl.context import Gpu
 
 DELAY = 3
 """Frames after which timestamps are read without `wait`: by then no driver has to be waited for."""

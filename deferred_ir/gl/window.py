@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DeviceError
-from . import raw
-from .devices import FLOOR
+from deferred_ir.base.errors import DeviceError
+from deferred_ir.gl import raw
+from deferred_ir.gl.devices import FLOOR
 
 INSTALL = "pip install 'deferred-ir[viewer]'"
 ELSE = "`deferred-ir render SCENE` makes pictures without a window"

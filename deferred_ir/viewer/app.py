@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ..gl.resources import GpuTexture
-from ..gl.window import Window
-from ..image import Image
-from .canvas import Area, Canvas
-from .controls import Controls
-from .panel import Panel
-from .session import Session
-from .watch import Watch, is_graph
+from deferred_ir.gl.textures import GpuTexture
+from deferred_ir.gl.window import Window
+from deferred_ir.output.image import Image
+from deferred_ir.viewer.canvas import Area, Canvas
+from deferred_ir.viewer.controls import Controls
+from deferred_ir.viewer.file_watch import Watch, is_graph
+from deferred_ir.viewer.panels.side_panel import Panel
+from deferred_ir.viewer.session import Session
 
 IDLE = 0.1
 """Seconds that a frame waits for input where there is nothing to draw."""

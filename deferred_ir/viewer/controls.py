@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..camera import Camera
-from ..gl.window import Window
-from .navigation import as_camera, as_light, moved, turned
-from .session import Session
+from deferred_ir.gl.window import Window
+from deferred_ir.scene.camera import Camera
+from deferred_ir.viewer.navigation import as_camera, as_light, moved, turned
+from deferred_ir.viewer.session import Session
 
 SCENES = ("cornell", "atrium", "colors")
 """Keys 1, 2, 3."""

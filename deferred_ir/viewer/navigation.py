@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..camera import Camera, view_fault
-from ..lights import Spotlight
-from ..typing import Array, Vec3
+from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.scene.camera import Camera, view_fault
+from deferred_ir.scene.lights.spot import Spotlight
 
 UP: Vec3 = (0.0, 1.0, 0.0)
 SIDE: Vec3 = (0.0, 0.0, 1.0)

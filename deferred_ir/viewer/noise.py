@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..accumulation import Accumulation
+from deferred_ir.engine.accumulation import Accumulation
 
 
 class Noise:

@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from .. import scene_file
-from ..camera import Camera
-from ..config import graph_names
-from ..errors import OutputError
-from ..graph import Graph
-from ..image import check_folder, write_whole
-from ..lights import Spotlight
-from ..motion import CameraMotion, LissajousMotion, ModelMotion, SpotlightMotion
-from ..params import specs
-from ..scene_file import ModelEntry
-from .session import Session
+from deferred_ir.base.errors import OutputError
+from deferred_ir.graph.file import graph_names
+from deferred_ir.graph.graph import Graph
+from deferred_ir.graph.params import specs
+from deferred_ir.loading import scene_file
+from deferred_ir.loading.scene_file import ModelEntry
+from deferred_ir.output.image import check_folder, write_whole
+from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.motion import CameraMotion, LissajousMotion, ModelMotion, SpotlightMotion
+from deferred_ir.viewer.session import Session
 
 GRAPH = "-graph.toml"
 """What a saved graph file's name adds to NAME."""

@@ -1,7 +1,7 @@
 """What the viewer shows: a scene, its camera and light, a graph with settings, and the Renderer that draws them.
 
-Knows neither window nor controls. A change costs what it must: frames are reused (deferred_ir/reuse.py), so a pass runs
-only if something has changed that it is made of. Whatever fails leaves the last good picture, and `error`.
+Knows neither window nor controls. A change costs what it must: frames are reused (deferred_ir/engine/reuse.py), so a
+pass is skipped while its inputs are unchanged. Whatever fails leaves the last good picture, and `error`.
 """
 
 from __future__ import annotations
@@ -14,24 +14,24 @@ from typing import Any
 
 import numpy as np
 
-from ..accumulation import Accumulation, readers
-from ..camera import Camera
-from ..errors import Error, GraphError
-from ..exposure import automatic_stops
-from ..gl.devices import Loader
-from ..graph import Plan
-from ..image import Image
-from ..lights import Spotlight
-from ..loading import load
-from ..motion import FRAMES_PER_SECOND
-from ..options import chosen_settings
-from ..renderer import IMAGES, Renderer
-from ..scene import Scene
-from ..timing import Record
-from .navigation import as_camera
-from .noise import Noise
-from .path import Path
-from .plans import changed, exposed
+from deferred_ir.base.errors import Error, GraphError
+from deferred_ir.engine.accumulation import Accumulation, readers
+from deferred_ir.engine.record import Record
+from deferred_ir.engine.renderer import IMAGES, Renderer
+from deferred_ir.engine.settings import chosen_settings
+from deferred_ir.gl.devices import Loader
+from deferred_ir.graph.graph import Plan
+from deferred_ir.loading.load import load
+from deferred_ir.output.exposure import automatic_stops
+from deferred_ir.output.image import Image
+from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.motion import FRAMES_PER_SECOND
+from deferred_ir.scene.scene import Scene
+from deferred_ir.viewer.navigation import as_camera
+from deferred_ir.viewer.noise import Noise
+from deferred_ir.viewer.plan_changes import changed, exposed
+from deferred_ir.viewer.recording import Path
 
 FRAMES_KEPT = 240
 """Frame times that are kept for the plot."""

@@ -18,11 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from deferred_ir.image_reading import read_radiance
-from deferred_ir.scene import Scene
-from deferred_ir.typing import Array
-
-from . import Rendered
+from deferred_ir.base.arrays import Array
+from deferred_ir.output.read import read_radiance
+from deferred_ir.profiling.peers.peer import Rendered
+from deferred_ir.scene.scene import Scene
 
 INSTALL = "bpy"
 
@@ -45,7 +44,7 @@ class Peer:
     about: str
 
     def __init__(self, scene: Scene, size: tuple[int, int], bounces: int) -> None:
-        from . import cycles_scene
+        from deferred_ir.profiling.peers import cycles_scene
 
         with _silent():
             import bpy

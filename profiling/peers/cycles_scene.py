@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from deferred_ir.camera import Camera
-from deferred_ir.geometry import Geometry
-from deferred_ir.lights import Spotlight, frames, one_minus_cos
-from deferred_ir.materials import srgb_table
-from deferred_ir.scene import Material, Scene, Texture
-from deferred_ir.typing import Array, Vec3
+from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.geometry import Geometry
+from deferred_ir.scene.lights.spot import Spotlight, frames, one_minus_cos
+from deferred_ir.scene.materials import srgb_table
+from deferred_ir.scene.scene import Material, Scene, Texture
 
 POINT_POWER = 4 * np.pi
 """Power, in watts, at which a point light of Blender's shines with 1 W/sr per unit of its nodes' emission."""

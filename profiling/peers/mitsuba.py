@@ -14,11 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from deferred_ir.errors import SettingError
-from deferred_ir.scene import Scene
-from deferred_ir.typing import Array
-
-from . import Rendered
+from deferred_ir.base.arrays import Array
+from deferred_ir.base.errors import SettingError
+from deferred_ir.profiling.peers.peer import Rendered
+from deferred_ir.scene.scene import Scene
 
 INSTALL = "mitsuba"
 
@@ -50,7 +49,7 @@ class Peer:
     def __init__(self, scene: Scene, size: tuple[int, int], bounces: int) -> None:
         import mitsuba
 
-        from . import mitsuba_scene
+        from deferred_ir.profiling.peers import mitsuba_scene
 
         self._mi: Any = mitsuba
         variant = next((name for name in VARIANTS if _works(name)), None)

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from deferred_ir.errors import SettingError
-from deferred_ir.lights import NEAR, Spotlight, one_minus_cos
-from deferred_ir.materials import srgb_table
-from deferred_ir.scene import Material, Scene
-from deferred_ir.typing import Array, Bools, Ints
+from deferred_ir.base.arrays import Array, Bools, Ints
+from deferred_ir.base.errors import SettingError
+from deferred_ir.scene.lights.spot import NEAR, Spotlight, one_minus_cos
+from deferred_ir.scene.materials import srgb_table
+from deferred_ir.scene.scene import Material, Scene
 
 SAMPLER = "multijitter"
 CONE_TEXELS = (1024, 4096)

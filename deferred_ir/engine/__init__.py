@@ -1,0 +1,1 @@
+"""Runs plans: renderer, executor, reuse, accumulation."""

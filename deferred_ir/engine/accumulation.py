@@ -1,0 +1,116 @@
+"""The mean of many frames with fresh samples: progressive rendering, for any graph.
+
+What the graph calls `radiance` is averaged in 64 bits, put back in its place, and the passes that read it run on that
+mean: so display pixels come from the graph's own tone map, of the mean, not from a mean of display pixels.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from deferred_ir.base.errors import GraphError
+from deferred_ir.engine.record import Record
+from deferred_ir.graph.graph import Plan
+from deferred_ir.output.image import Image
+from deferred_ir.sampling.patterns import frame_seed
+from deferred_ir.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from deferred_ir.engine.renderer import Renderer
+
+LAP = "accumulate"
+"""What the time is called that adding up takes."""
+
+
+class Accumulation:
+    """Draws frames of `scene` at `time`, one by one, and averages them; frame k of seed s has frame_seed(s, k).
+
+    plan: one with the output radiance; all else that it makes images of must be made of that. record: gets one frame
+    for each image, its time all that was drawn for it, and the counters of each frame drawn. Raises GraphError where
+    the plan does not fit.
+    """
+
+    def __init__(
+        self,
+        renderer: Renderer,
+        scene: Scene,
+        plan: Plan,
+        *,
+        seed: int = 0,
+        time: float = 0.0,
+        record: Record | None = None,
+    ) -> None:
+        origin = renderer.graph().origin
+        if "radiance" not in plan.outputs:
+            raise GraphError(f"{origin}: has no output 'radiance', which is what frames are averaged in; add it")
+        self._source = plan.outputs["radiance"]
+        self.follow(plan)
+        if plan.outputs.get("display", self._source)[0] in self._early - {self._source[0]}:
+            raise GraphError(
+                f"{origin}: outputs.display: is not made of outputs.radiance, so it cannot show the mean of frames; "
+                "ask for .npy or .exr only, or for one frame"
+            )
+        self._renderer, self._scene, self._seed, self._time = renderer, scene, seed, time
+        self._record, self._parts = record, Record() if record else None
+        self._adding_ms = 0.0
+        self._sum: tuple[int, Any] = 0, 0.0
+
+    def follow(self, plan: Plan) -> None:
+        """Go on with `plan`, which differs from the one before only in what reads the mean."""
+        self._plan, self._late = plan, readers(plan, self._source)
+        self._early = {step.name for step in plan.steps} - self._late
+
+    @property
+    def frames(self) -> int:
+        """How many frames the mean is of."""
+        return self._sum[0]
+
+    @property
+    def total(self) -> Any:
+        """The sum of the frames so far, float64 (H, W, 4), bottom row first; a new array for each frame."""
+        return self._sum[1]
+
+    def draw(self) -> None:
+        """Draw the next frame and add it. One that is broken off, by Ctrl-C say, has never been."""
+        done, total = self._sum
+        self._run(frame_seed(self._seed, done), self._early)
+        start = clock.perf_counter()
+        with self._renderer.gpu.ctx:
+            pixels = self._renderer.executor.resource(self._source).read()
+        self._sum = done + 1, total + pixels.astype(np.float64)  # at once, whenever an interrupt comes
+        self._adding_ms += (clock.perf_counter() - start) * 1e3
+
+    def image(self) -> Image:
+        """The mean of the frames so far, one at least."""
+        self.show()
+        return self._renderer.read(self._plan)
+
+    def show(self) -> None:
+        """Put the mean in the place of radiance, and run what reads it."""
+        done, total = self._sum
+        with self._renderer.gpu.ctx:
+            self._renderer.executor.resource(self._source).upload(total / done)
+        self._run(self._seed, self._late)
+        if self._record and self._parts:
+            self._renderer.finish(self._parts)
+            for figures in (self._parts.counters, self._parts.kept):
+                figures.pop()  # of the passes that came after the frames
+            self._parts.frame_ms.append(self._adding_ms)
+            self._parts.laps.insert(-1, {LAP: (self._adding_ms, self._adding_ms)})
+            self._record.join(self._parts)
+            self._parts, self._adding_ms = Record(), 0.0
+
+    def _run(self, seed: int, steps: set[str]) -> None:
+        self._renderer.draw(self._scene, self._plan, seed=seed, time=self._time, record=self._parts, steps=steps)
+
+
+def readers(plan: Plan, source: tuple[str, str]) -> set[str]:
+    """Names of the steps that read what `source` (pass, port) wrote, themselves or through others."""
+    found: set[str] = set()
+    for step in plan.steps:
+        if any(wire and (wire == source or wire[0] in found) for wire in step.sources.values()):
+            found.add(step.name)
+    return found

@@ -1,0 +1,290 @@
+"""The way in: a Renderer holds one OpenGL context, one graph and the last scene it drew."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Container, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import replace
+from numbers import Integral
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.base.errors import GraphError, SettingError
+from deferred_ir.engine.accumulation import Accumulation
+from deferred_ir.engine.executor import Executor
+from deferred_ir.engine.record import Record
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.scene_buffers import SceneBuffers
+from deferred_ir.gl.context import Gpu
+from deferred_ir.gl.devices import Loader
+from deferred_ir.gl.timers import Timers
+from deferred_ir.graph import file
+from deferred_ir.graph.compile import compile
+from deferred_ir.graph.graph import Graph, Pass, Plan
+from deferred_ir.output.image import Image
+from deferred_ir.rays.tracer import Tracer
+from deferred_ir.scene.scene import Scene
+
+IMAGES = {"radiance": ("rgba32f", "rgba16f"), "display": ("rgba8",)}
+"""Formats of the outputs that become images."""
+
+
+class Renderer:
+    """Renders scenes through a render graph.
+
+    size: (width, height) in pixels. graph: a built-in name or a graph file. device: see `deferred-ir devices`.
+    set: parameters of passes, {"pass.param": value}. passes: pass classes of your own, {type name: class}, which a
+    graph file then names. reuse: a pass runs only if something has changed that its outputs are made of; else every
+    frame redoes everything. keep_all: leave nothing out that this scene or view does not need; the pixels are the same.
+    window: its context, which is current, instead of a headless one on `device`.
+
+    One context, one scene upload: render as often as you like, and close it (or use `with`). It belongs to the thread
+    that made it.
+    """
+
+    def __init__(
+        self,
+        size: tuple[int, int] = (512, 512),
+        graph: str | Path = "deferred",
+        device: str = "auto",
+        *,
+        set: Mapping[str, Any] | None = None,
+        passes: Mapping[str, type[Pass]] | None = None,
+        reuse: bool = False,
+        keep_all: bool = False,
+        window: Loader | None = None,
+    ) -> None:
+        if not isinstance(size, Sequence) or len(size) != 2 or not all(isinstance(n, Integral) and n > 0 for n in size):
+            raise SettingError(f"size {size!r}: wants two whole numbers above 0, width and height")
+        self.size, self.reuse = (int(size[0]), int(size[1])), reuse
+        self._graph_name, self._set, self._passes = graph, dict(set or {}), dict(passes or {})
+        self._keep_all = keep_all
+        self._graphs: dict[int | None, Graph] = {}
+        self._plans: dict[Any, Plan] = {}
+        self.graph(None)  # a fault in the graph shows before a context is made
+        self.gpu = Gpu(device, window)
+        if max(size) > self.gpu.max_size:
+            self.gpu.close()
+            raise SettingError(f"size {size[0]}x{size[1]}: this driver draws at most {self.gpu.max_size} a side")
+        self.executor = Executor(self.gpu)
+        self._timers = Timers(self.gpu)
+        self._buffers: SceneBuffers | None = None
+        self._tracer: Tracer | None = None
+        self._scene: Scene | None = None
+        self._closed = False
+
+    def configure(
+        self,
+        *,
+        size: tuple[int, int] | None = None,
+        graph: str | Path | None = None,
+        set: Mapping[str, Any] | None = None,
+    ) -> Callable[[], None]:
+        """Change what is named; the rest stays, and so do programs, textures and the scene that are still needed.
+
+        With `graph` or `set` files are read again. After a GraphError nothing has changed. What is returned takes the
+        change back.
+        """
+        names = ("size", "_graph_name", "_set", "_graphs", "_plans")
+        before = {name: getattr(self, name) for name in names}
+        name = self._graph_name if graph is None else graph
+        settings = self._set if set is None else dict(set)
+        own = self.graph(None)
+        if graph is not None or set is not None:
+            own = file.load_graph(name, settings, self._passes)
+        if size is not None:
+            self.size = size
+        self._graph_name, self._set = name, settings
+        self._graphs, self._plans = {None: own}, {}
+        return lambda: self.__dict__.update(before)
+
+    def graph(self, vpls: int | None = None) -> Graph:
+        """The graph with this number of VPLs, None for its own."""
+        if vpls not in self._graphs:
+            count = {} if vpls is None else {"vpl.count": vpls}
+            self._graphs[vpls] = file.load_graph(self._graph_name, self._set | count, self._passes)
+        return self._graphs[vpls]
+
+    def plan(
+        self,
+        scene: Scene,
+        vpls: int | None = None,
+        outputs: Sequence[str] | None = None,
+        *,
+        keep_all: bool | None = None,
+    ) -> Plan:
+        """What a frame of `scene` runs; `outputs` are all that the graph has unless some are named.
+
+        keep_all: with or without what the scene does not need; None: as the Renderer was made.
+        """
+        if not isinstance(scene, Scene):
+            raise SettingError(f"scene: is {type(scene).__name__}, not a Scene; load it first: deferred_ir.load(...)")
+        graph = self.graph(vpls)
+        known = replace(
+            scene.facts,
+            pixels=self.size[0] * self.size[1],
+            software=self.gpu.device.kind == "software",
+            keep_all=self._keep_all if keep_all is None else keep_all,
+        )
+        wanted = tuple(graph.outputs if outputs is None else outputs)
+        key = (vpls, known, wanted)
+        if key not in self._plans:
+            plan = compile(graph, wanted, known)
+            _check_images(graph, plan)
+            self._plans[key] = plan
+        return self._plans[key]
+
+    def render(
+        self, scene: Scene, *, vpls: int | None = None, seed: int = 0, time: float = 0.0, accumulate: int = 1
+    ) -> Image:
+        """One image of `scene` at `time` seconds with `vpls` VPLs (None: as many as the graph says).
+
+        accumulate: frames with fresh samples that are averaged in it; `Accumulation` adds them up one by one.
+        """
+        if not isinstance(accumulate, Integral) or accumulate < 1:
+            raise SettingError(f"accumulate {accumulate!r}: wants a whole number of 1 or more")
+        images = [name for name in self.graph(vpls).outputs if name in IMAGES]
+        plan = self.plan(scene, vpls, images)
+        if accumulate == 1:
+            self.draw(scene, plan, seed=seed, time=time)
+            return self.read(plan)
+        mean = Accumulation(self, scene, plan, seed=seed, time=time)
+        for _ in range(accumulate):
+            mean.draw()
+        return mean.image()
+
+    def draw(
+        self,
+        scene: Scene,
+        plan: Plan,
+        *,
+        seed: int = 0,
+        time: float = 0.0,
+        record: Record | None = None,
+        steps: Container[str] | None = None,
+    ) -> None:
+        """Draw one frame and wait for it; what it took is added to `record`. steps: those to run, None for all."""
+        if not isinstance(seed, Integral) or seed < 0:
+            raise SettingError(f"seed {seed!r}: wants a whole number of 0 or more")
+        if self._closed:
+            raise SettingError("Renderer: is closed; make a new one")
+        with self.gpu.ctx:
+            start = clock.perf_counter()
+            placed = scene.at(time).centred
+            moved = clock.perf_counter()
+            self._upload(placed)
+            assert self._buffers
+            start += clock.perf_counter() - moved  # once a scene: not what a frame costs
+            self._buffers.move(placed.geometry)
+            frame = Frame(self.size, placed, self._buffers, self.tracer, seed, time, self.reuse, self._keep_all)
+            timers = self._timers if record else None
+            with timers.frame() if timers else nullcontext():
+                self.executor.run(plan, frame, timers, steps=steps)
+            self.gpu.ctx.finish()
+            self.gpu.gl.check(f"a frame of {self.size[0]}x{self.size[1]}")
+            if record and timers:
+                record.frame_ms.append((clock.perf_counter() - start) * 1e3)
+                record.laps += timers.collect()
+                record.counters.append(dict(self.executor.counters))
+                record.kept.append(self.executor.kept)
+
+    def reset(self) -> None:
+        """Drop what is kept from frame to frame: the next one starts afresh, and runs every pass."""
+        self.executor.forget()
+
+    def finish(self, record: Record) -> None:
+        """Add the timestamps still in flight to `record`."""
+        with self.gpu.ctx:
+            record.laps += self._timers.collect(wait=True)
+
+    def read(self, plan: Plan) -> Image:
+        """The image that the last `draw` of `plan` made."""
+        with self.gpu.ctx:
+            arrays = {
+                name: self.executor.resource(source).read()[::-1]
+                for name, source in plan.outputs.items()
+                if name in IMAGES
+            }
+        radiance, display = arrays.get("radiance"), arrays.get("display")
+        return Image(
+            None if radiance is None else np.ascontiguousarray(radiance[..., :3]),
+            None if display is None else np.ascontiguousarray(display[..., :3]),
+        )
+
+    def memory(self) -> dict[str, int]:
+        """Bytes of textures and buffers on the device, the scene's included."""
+        memory = self.executor.memory()
+        if self._buffers:
+            memory["textures"] += self._buffers.texture_bytes
+            memory["buffers"] += self._buffers.buffer_bytes
+        return memory
+
+    @property
+    def embree_seconds(self) -> float:
+        """Time spent inside Embree since the scene was loaded."""
+        return self._tracer.seconds if self._tracer else 0.0
+
+    def _upload(self, scene: Scene) -> None:
+        """Put the scene on the device unless it is there; the same surfaces may come with a new camera or light.
+
+        Moving models may be elsewhere, too: then the surfaces are those of one `rest`.
+        """
+        if not (self._scene and _same_surfaces(scene, self._scene)):
+            self._forget()
+            self.reset()
+            self._buffers = SceneBuffers(self.gpu, scene, general=self._keep_all)
+        self._scene = scene
+
+    def tracer(self) -> Tracer:
+        """Embree over the scene drawn last, in the coordinates of `Scene.centred`, built when first asked for."""
+        assert self._scene, "no scene was drawn yet"
+        if self._tracer is None:
+            self._tracer = Tracer(self._scene)
+        self._tracer.follow(self._scene)
+        return self._tracer
+
+    def _forget(self) -> None:
+        if self._buffers:
+            for owner in self._buffers.owners:
+                self.executor.library.forget(owner)
+            self._buffers.release()
+        self._buffers = self._tracer = self._scene = None
+
+    def close(self) -> None:
+        """Give the context and all in it back; a second time does nothing."""
+        if self._closed:
+            return
+        self._closed = True
+        with self.gpu.ctx:
+            self._forget()
+            self._timers.release()
+            self.executor.release()
+        self.gpu.close()
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _same_surfaces(one: Scene, other: Scene) -> bool:
+    same_rest = one.geometry.rest is other.geometry.rest
+    return same_rest and one.materials is other.materials and one.textures is other.textures
+
+
+def _check_images(graph: Graph, plan: Plan) -> None:
+    """Raise GraphError if an output that becomes an image is of another kind."""
+    steps = {step.name: step for step in plan.steps}
+    for name, (source, port) in plan.outputs.items():
+        found = steps[source].outputs[port].description.format
+        if name in IMAGES and found not in IMAGES[name]:
+            raise GraphError(
+                f"{graph.origin}: outputs.{name}: wants {' or '.join(IMAGES[name])}, but {source}.{port} is {found}"
+            )

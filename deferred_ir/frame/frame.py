@@ -1,0 +1,82 @@
+"""One frame: what passes are told about it, and the uniform block in which shaders read it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from deferred_ir.base.arrays import Vec3
+from deferred_ir.frame.scene_buffers import SceneBuffers
+from deferred_ir.gl.textures import GpuTexture
+from deferred_ir.rays.pixel_surfaces import Surfaces, from_gbuffer
+from deferred_ir.rays.tracer import Tracer
+from deferred_ir.scene.lights.spot import NEAR
+from deferred_ir.scene.scene import Scene
+
+FRAME = np.dtype(
+    [
+        ("camera", "f4", 3),
+        ("near", "f4"),  # near plane of the camera and of all lights
+        ("ray", "f4", (3, 4)),  # a, b, c of Camera.ray_axes: a point at view depth 1 is camera + a x + b y + c
+        ("clip", "f4", (3, 4)),  # rows that take a point relative to the camera to clip x, clip y and view depth
+    ]
+)
+"""Written to uniform block 0; shaders/lib/camera/frame.glsl declares the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What a pass may know of a frame. `scene` has camera and light at `time` [s]; `buffers` is it on the GPU.
+
+    reuse: what the last frame left may be used again where it would come out the same.
+    keep_all: nothing may be left out that another scene or view would need.
+    """
+
+    size: tuple[int, int]
+    scene: Scene
+    buffers: SceneBuffers
+    tracer: Callable[[], Tracer]
+    seed: int = 0
+    time: float = 0.0
+    reuse: bool = False
+    keep_all: bool = False
+    _surfaces: dict[tuple[GpuTexture, GpuTexture], Surfaces] = field(default_factory=dict, init=False)
+
+    @property
+    def by_view(self) -> bool:
+        """Whether what this camera's view does not need may be left out: the next frame is drawn afresh."""
+        return not (self.reuse or self.keep_all)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether shading normals may differ from the faces'."""
+        return self.buffers.defines["HAS_NORMALS"] == 1
+
+    @property
+    def near(self) -> float:
+        """Near plane of the camera and of all lights, in world units."""
+        return NEAR * self.scene.geometry.scale
+
+    def surfaces(self, depth: GpuTexture, normals: GpuTexture) -> Surfaces:
+        """What the pixels of a G-buffer show, read back when first asked for: after both textures were written."""
+        key = depth, normals
+        if key not in self._surfaces:
+            smooth = self.scene.geometry.normals is not None
+            self._surfaces[key] = from_gbuffer(
+                self.scene.camera, self.near, depth.read()[..., 0], normals.read(), smooth=smooth
+            )
+        return self._surfaces[key]
+
+    def block(self) -> bytes:
+        """The FRAME record."""
+        record = np.zeros((), FRAME)
+        camera = self.scene.camera
+        rays = camera.ray_axes(self.size)
+        position: Vec3 = camera.position
+        record["camera"], record["near"] = position, self.near
+        record["ray"][:, :3] = rays
+        # Axes are orthogonal, so dividing by the squared length inverts them; forward has length 1.
+        record["clip"][:, :3] = rays / (rays**2).sum(axis=1, keepdims=True)
+        return record.tobytes()

@@ -1,0 +1,93 @@
+"""The light buffer: the spotlight's record and then one for each VPL, and the parameters that all who fill it have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import Literal
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Bools, Ints
+from deferred_ir.base.versions import new_versions
+from deferred_ir.gl.textures import GpuBuffer
+from deferred_ir.graph.graph import Buffer, Facts, Output
+from deferred_ir.graph.params import param
+from deferred_ir.scene.lights.spot import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
+from deferred_ir.scene.scene import Scene
+from deferred_ir.vpls.cast import Vpls
+
+AUTO_CLAMP = 0.64
+"""Clamp distance of one VPL in diagonals where short rays give back what it takes: best at 64 to 1024 VPLs of both a
+room and a cathedral, and flat about there (half or twice of it costs a tenth to a half of the error)."""
+
+ROUNDINGS = 8
+"""Of a coordinate: what a VPL's surface and its map may be apart by, with positions and their products rounded."""
+
+
+@dataclass(frozen=True)
+class VplParams:
+    """Parameters of VPLs, wherever they come from."""
+
+    count: int = param(64, lo=0, hi=65536, doc="Rays that leave the spotlight; each that lands makes a VPL.")
+    fov: float = param(150.0, lo=1.0, hi=179.9, doc="Full opening angle of the cone a VPL shines into, degrees.")
+    clamp: float | Literal["auto"] = param(
+        0.02,
+        lo=0.0,
+        hi=10.0,
+        doc="Distance below which 1/d^2 is held, as a fraction of the scene's diagonal; auto: 0.64 / sqrt(count).",
+    )
+
+    @property
+    def clamp_fraction(self) -> float:
+        """The clamp distance in diagonals. auto: in proportion to the distance between VPLs, whose spikes it holds."""
+        return AUTO_CLAMP / sqrt(max(self.count, 1)) if self.clamp == "auto" else self.clamp
+
+    def informed(self, facts: Facts) -> Facts:
+        """Whether there will be VPLs, and a clamp that holds them."""
+        vpls = self.count > 0 and facts.emits
+        return replace(facts, vpls=vpls, clamped=vpls and self.clamp_fraction > 0)
+
+
+def output(vpls: int, bounces: int = 1) -> Output:
+    """The port of a buffer with room for the spotlight and `vpls` VPLs."""
+    records = Buffer("light", 1 + vpls, LIGHT.itemsize, LIGHTS_PER_BLOCK)
+    return Output("the spotlight, then the VPLs", records, {"LIGHTS_PER_BLOCK": LIGHTS_PER_BLOCK, "BOUNCES": bounces})
+
+
+def packed(scene: Scene, vpls: Vpls, params: VplParams, tiles: Ints) -> np.ndarray:
+    """LIGHT records (1 + n,) of the scene's spotlight and n VPLs; tiles: int (n,), of their maps in the atlas."""
+    light = scene.spotlight
+    position = off_surface(scene, vpls.position, vpls.normal)
+    records = np.zeros(1 + len(vpls), LIGHT)
+    spot = np.array([light.position]), light.axis[None], np.array([light.emission])
+    fill_records(records[:1], *spot, fov=light.fov, tile=SPOT_TILE)
+    fill_records(records[1:], position, vpls.normal, vpls.emission, fov=params.fov, tile=tiles.astype("f4"))
+    records["clamp_squared"][0] = light.radius
+    records["clamp_squared"][1:] = (params.clamp_fraction * scene.geometry.diagonal) ** 2
+    return records
+
+
+def off_surface(scene: Scene, position: Array, normal: Array) -> Array:
+    """Where VPLs stand, (n, 3): off their surfaces by its roundings, or their maps would show these here and there."""
+    size = np.maximum(np.abs(position).max(axis=1, keepdims=True), scene.geometry.scale)
+    lifted: Array = position + normal * (ROUNDINGS * 2.0**-24 * size)
+    return lifted
+
+
+def map_versions(lights: GpuBuffer, records: np.ndarray, scene: Scene) -> Ints:
+    """Versions (n,) of LIGHT records (n,) that come next in `lights`: a record keeps its own while its map would.
+
+    A map shows the same while the models stay and light i looks as it did; how bright it is does not matter.
+    """
+    shapes = records.copy()
+    shapes["emission"] = shapes["clamp_squared"] = 0
+    looks = shapes.view(np.uint32).reshape(len(records), -1)
+    geometry, before, versions = lights.kept or (None, looks[:0], np.zeros(0, int))
+    both = min(len(looks), len(before)) if geometry is scene.geometry else 0
+    same: Bools = np.zeros(len(looks), bool)
+    same[:both] = (looks[:both] == before[:both]).all(axis=1)
+    made = new_versions(len(looks))
+    made[same] = versions[:both][same[:both]]
+    lights.kept = scene.geometry, looks, made
+    return made

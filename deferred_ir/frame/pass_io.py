@@ -1,0 +1,144 @@
+"""What a pass sees while it executes: its ports, its programs, and a base for passes that are one fullscreen shader."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from deferred_ir.base.errors import DeviceError, ShaderError
+from deferred_ir.frame.frame import Frame
+from deferred_ir.gl.shaders import Program, ShaderLibrary
+from deferred_ir.gl.textures import Framebuffer, GpuBuffer, GpuTexture
+from deferred_ir.graph.graph import Pass, Step
+from deferred_ir.graph.params import specs
+
+NO_DEFINES: Mapping[str, int | float] = {}
+Resource = GpuTexture | GpuBuffer | list[GpuTexture]
+SCENE_SAMPLERS = {"albedo_texture"}
+"""Samplers that SceneBuffers binds; all others must be ports."""
+
+
+class Io:
+    """A pass's ports during `execute`: `io["depth"]` is a resource; `io.program(...)` knows the inputs' defines.
+
+    written: the defines of each (pass, port) of the plan. What a run publishes: counters, of its work; standing, of
+    what its outputs hold; again: whether the next frame must run the pass even if nothing that it is made of changes.
+    """
+
+    def __init__(
+        self,
+        library: ShaderLibrary,
+        step: Step,
+        ports: Mapping[str, Resource | None],
+        written: Mapping[tuple[str, str], Mapping[str, int | float]],
+    ) -> None:
+        self._library, self._step, self._ports = library, step, ports
+        self.counters: Counter[str] = Counter()
+        self.standing: Counter[str] = Counter()
+        self.again = False
+        self.gpu = library.gpu
+        self._framebuffer: Framebuffer | None = None
+        self._programs: dict[Any, Program] = {}
+        textures = [name for name in step.work.inputs if isinstance(ports[name], GpuTexture)]
+        sampled = [name for name in textures if not step.work.inputs[name].attach]
+        self._units = {name: i for i, name in enumerate(sampled)}
+        self.defines: dict[str, int | float] = {f"UNIT_{name.upper()}": i for name, i in self._units.items()}
+        for name, source in step.sources.items():
+            self.defines[f"HAS_{name.upper()}"] = int(source is not None)
+            if source:
+                self.defines |= written[source]
+        for output in step.outputs.values():
+            self.defines |= output.defines
+        drawn = [name for name, output in step.outputs.items() if output.attach and _colour(ports[name])]
+        self.defines |= {f"TARGET_{name.upper()}": i for i, name in enumerate(drawn)}
+
+    def __getitem__(self, port: str) -> Any:
+        if port not in self._ports:
+            raise KeyError(f"{self._step.name} declares no port '{port}'; it has: {', '.join(self._ports)}")
+        return self._ports[port]
+
+    @property
+    def framebuffer(self) -> Framebuffer:
+        """The pass's textures as a render target, bound when `execute` begins."""
+        if self._framebuffer is None:
+            raise ValueError(f"{self._step.name}: has no output to draw into")
+        return self._framebuffer
+
+    def attach(self, framebuffer: Framebuffer) -> None:
+        """Give the pass its render target."""
+        self._framebuffer = framebuffer
+
+    def begin(self) -> None:
+        """Before a run: bind the framebuffer and all sampled inputs; nothing is published yet."""
+        self.counters.clear()
+        self.standing.clear()
+        self.again = False
+        if self._framebuffer:
+            self._framebuffer.bind()
+        for name, unit in self._units.items():
+            port = self._step.work.inputs[name]
+            self[name].bind(unit, self.gpu.sampler(port.linear, port.compare))
+
+    def program(self, *files: str, defines: Mapping[str, int | float] = NO_DEFINES) -> Program:
+        """The program of these shader files, one a stage, with the defines of this pass's ports and `defines`."""
+        key = (*files, *defines.items())
+        if key not in self._programs:
+            folder = self._step.work.shader_folder
+            program = self._library.program(*files, defines={**self.defines, **defines}, folder=folder)
+            unknown = program.samplers - SCENE_SAMPLERS - set(self._step.work.inputs)
+            if unknown:
+                raise ShaderError(f"{program.name}: sampler '{min(unknown)}' is no input of pass {self._step.name}")
+            self._programs[key] = program
+        return self._programs[key]
+
+    def fit(self, port: str, layers: int) -> None:
+        """Let the texture `port`, one that grows and is drawn into, have room for `layers` layers."""
+        try:
+            anew = self[port].fit(layers)
+        except DeviceError as error:
+            self.framebuffer.attach()
+            raise DeviceError(f"{self._step.name}.{port}: {error}") from error
+        if anew:
+            self.framebuffer.attach()
+
+    def count(self, name: str, value: int) -> None:
+        """Publish how much work this run did, such as the number of maps drawn; none where the pass is not run."""
+        self.counters[name] += value
+
+    def state(self, name: str, value: int) -> None:
+        """Publish a figure of what the outputs hold, such as the number of VPLs alive."""
+        self.standing[name] += value
+
+    def repeat(self) -> None:
+        """Let the next frame run the pass in any case: what it keeps from frame to frame has not come to rest."""
+        self.again = True
+
+
+def _colour(resource: Resource | None) -> bool:
+    return isinstance(resource, GpuTexture) and not resource.format.depth
+
+
+class FullscreenPass(Pass):
+    """A pass that runs `fragment` once a pixel: inputs are samplers and parameters are uniforms of the same name.
+
+    A pass of this kind is its ports and its parameters.
+    """
+
+    fragment: ClassVar[str]
+    vertex: ClassVar[str] = "fullscreen.vert"
+
+    def uniforms(self) -> Mapping[str, Any]:
+        """Uniform values; parameters by default."""
+        return {name: getattr(self.params, name) for name in specs(self.Params)}
+
+    def defines(self, frame: Frame) -> Mapping[str, int | float]:
+        """Defines that choose a variant of the shader for this frame; none by default."""
+        del frame
+        return NO_DEFINES
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Draw the fullscreen triangle."""
+        program = io.program(self.fragment, self.vertex, defines=self.defines(frame))
+        program.set(**self.uniforms())
+        program.draw_fullscreen()

@@ -1,0 +1,207 @@
+"""A scene on the GPU: vertices, faces, materials and textures, uploaded once; of moving models what moves, again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.base.errors import DeviceError
+from deferred_ir.frame.cluster_buffers import ClusterBuffers
+from deferred_ir.gl.context import Gpu
+from deferred_ir.gl.shaders import Program
+from deferred_ir.gl.textures import GpuTexture
+from deferred_ir.graph.graph import Texture
+from deferred_ir.meshes.clusters import Clusters
+from deferred_ir.meshes.posed import MapMesh, PosedMesh
+from deferred_ir.scene.geometry import Geometry
+from deferred_ir.scene.materials import srgb_table
+from deferred_ir.scene.scene import Scene
+
+FACES, MATERIALS = 0, 1
+"""Bindings of the storage buffers that lib/surface/surface.glsl declares."""
+ALBEDO_TEXTURE = 15
+"""Texture unit of `albedo_texture`; inputs of passes count up from 0, and GL promises 16 units."""
+OWN = "own"
+"""Key of the scene's own triangles in clusters, among those of stand-ins."""
+
+
+class SceneBuffers:
+    """Indexed triangles with what shaders read of each face.
+
+    defines: say what there is of attributes, materials and textures, so that shaders have nothing for the rest.
+    general: there are normals and texture coordinates in any case, with values that change nothing, and shaders are
+    those for any scene.
+    """
+
+    def __init__(self, gpu: Gpu, scene: Scene, *, general: bool = False) -> None:
+        self.gpu, g = gpu, scene.geometry
+        self._geometry, self._poses = g, g.poses.copy()
+        uvs = g.uvs if scene.textures else None
+        arrays = {"position": g.positions, "normal": g.normals, "color": g.colors, "uv": uvs}
+        if general:
+            count = len(g.positions)
+            # No normal: the face's counts. Without a texture nothing is looked up at `uv`. There is no such colour: an
+            # interpolated 1 is not quite 1.
+            neutral = {"normal": np.zeros((count, 3)), "uv": np.zeros((count, 2))}
+            arrays |= {name: array for name, array in neutral.items() if arrays[name] is None}
+        self._ranges = _ranges(scene)
+        self.defines = {
+            "HAS_NORMALS": int(arrays["normal"] is not None),
+            "HAS_UVS": int(arrays["uv"] is not None),
+            "HAS_COLORS": int(arrays["color"] is not None),
+            "ONE_MATERIAL": int(len(scene.materials) == 1 and not general),
+            "ALL_TEXTURED": int(all(texture is not None for texture, _, _ in self._ranges) and not general),
+        }
+        ctx = gpu.ctx
+        self._attributes = {
+            name: (ctx.buffer(np.ascontiguousarray(array, "f4").tobytes()), f"{array.shape[1]}f")
+            for name, array in arrays.items()
+            if array is not None
+        }
+        self._indices = ctx.buffer(np.ascontiguousarray(g.faces, "u4").tobytes())
+        faces = _face_records(g, slice(None))
+        materials = np.array([(*material.albedo, 0) for material in scene.materials], "f4")
+        self._faces, self._materials = ctx.buffer(faces.tobytes()), ctx.buffer(materials.tobytes())
+        gpu.gl.check(f"scene '{scene.name}' with {len(g.faces)} triangles")
+        self._textures = [self._upload(texture) for texture in scene.textures]
+        self.face_count = len(g.faces)
+        buffers = [*(buffer for buffer, _ in self._attributes.values()), self._indices, self._faces, self._materials]
+        self._buffers = buffers
+        self._clustered: dict[Hashable, ClusterBuffers] = {}
+        self.texture_bytes = sum(texture.nbytes for texture in self._textures)
+
+    @property
+    def buffer_bytes(self) -> int:
+        """Bytes of all buffers, those of clusters too once there are some."""
+        return sum(buffer.size for buffer in self._buffers) + sum(mesh.nbytes for mesh in self._clustered.values())
+
+    @property
+    def owners(self) -> list[Any]:
+        """Under what programs keep vertex arrays for this scene."""
+        return [self, *self._clustered.values()]
+
+    @cached_property
+    def _own(self) -> PosedMesh:
+        mesh = MapMesh.of(self._geometry)
+        return mesh.posed(mesh.clustered(), self._geometry.poses)
+
+    @property
+    def clusters(self) -> Clusters:
+        """The scene's triangles in clusters, on the CPU."""
+        return self._own.clusters
+
+    @property
+    def cluster_buffers(self) -> ClusterBuffers:
+        """The scene's triangles in clusters, made when first drawn so."""
+        if OWN not in self._clustered:
+            self._clustered[OWN] = ClusterBuffers(self.gpu, self._own, self._attributes["position"][0])
+        return self._clustered[OWN]
+
+    def stand_in(
+        self, key: Hashable, make: Callable[[], MapMesh], cluster: Callable[[MapMesh], Clusters] = MapMesh.clustered
+    ) -> ClusterBuffers:
+        """Another mesh that is drawn in the scene's place, in clusters, kept by `key` until the scene goes.
+
+        make: gives it, with as many moving models as the scene; cluster: groups it. Both are called for the first draw
+        only.
+        """
+        if key not in self._clustered:
+            mesh, poses = make(), self._geometry.poses
+            self._buffers.append(self.gpu.ctx.buffer(np.ascontiguousarray(mesh.positions, "f4").tobytes()))
+            made = ClusterBuffers(self.gpu, mesh.posed(cluster(mesh), poses), self._buffers[-1])
+            for number, pose in enumerate(poses):
+                made.move(number, pose)
+            self._clustered[key] = made
+        return self._clustered[key]
+
+    def move(self, geometry: Geometry) -> None:
+        """Bring moving models to where `geometry`, posed from the same rest, has them; the rest is not touched."""
+        self._geometry = geometry
+        for number in np.flatnonzero((geometry.poses != self._poses).any(axis=(1, 2))).tolist():
+            self._poses[number] = np.nan  # as long as not all is there: a move that is broken off is done again
+            vertices = geometry.moving[number].vertices
+            for name, array in (("position", geometry.positions), ("normal", geometry.normals)):
+                if array is not None:
+                    part = np.ascontiguousarray(array[vertices], "f4")
+                    self._attributes[name][0].write(part.tobytes(), offset=12 * vertices.start)
+            for faces in _runs(geometry.faces_of[number]):
+                self._faces.write(_face_records(geometry, faces).tobytes(), offset=16 * faces.start)
+            if "_own" in self.__dict__:
+                self._own.move(number, geometry.poses[number])
+            for mesh in (mesh for key, mesh in self._clustered.items() if key != OWN):
+                mesh.move(number, geometry.poses[number])
+            self._poses[number] = geometry.poses[number]
+
+    def _upload(self, texture: Any) -> GpuTexture:
+        height, width = texture.pixels.shape[:2]
+        if max(width, height) > self.gpu.max_size:
+            raise DeviceError(
+                f"{texture.name}: {width}x{height} pixels, and this driver takes at most {self.gpu.max_size}; "
+                "scale the image down"
+            )
+        # Decoded here, into half floats: drivers may approximate sRGB (llvmpipe is 2 % off in dark texels), and rays
+        # must fetch what the rasteriser shows.
+        linear = np.ones((height, width, 4), np.float32)
+        linear[..., :3] = srgb_table().astype(np.float16)[texture.pixels]
+        result = GpuTexture(self.gpu, Texture("rgba16f", (width, height)), (width, height))
+        result.upload(linear[::-1])
+        return result
+
+    def bind(self) -> None:
+        """Make faces and materials visible to shaders."""
+        self._faces.bind_to_storage_buffer(FACES)
+        self._materials.bind_to_storage_buffer(MATERIALS)
+
+    def draw(self, program: Program, instances: int = 1) -> None:
+        """Draw all triangles: in one call, or one a texture where the program samples textures."""
+        array = program.arrays.get(self)
+        if array is None:
+            attributes = [(*self._attributes[name], name) for name in program.attributes]
+            array = self.gpu.ctx.vertex_array(program.glsl, attributes, self._indices, index_element_size=4)
+            program.arrays[self] = array
+        if "albedo_texture" not in program.samplers:
+            if program.has("first_face"):
+                program.set(first_face=0)
+            array.render(self.gpu.ctx.TRIANGLES, instances=instances)
+            return
+        for texture, first, count in self._ranges:
+            if texture is not None:
+                self._textures[texture].bind(ALBEDO_TEXTURE, self.gpu.sampler(linear=True, repeat=True))
+            program.set(textured=texture is not None, first_face=first)
+            array.render(self.gpu.ctx.TRIANGLES, vertices=3 * count, first=3 * first, instances=instances)
+
+    def release(self) -> None:
+        """Give everything back. Vertex arrays that programs keep for this scene must go first."""
+        for mesh in self._clustered.values():
+            mesh.release()
+        for buffer in self._buffers:
+            buffer.release()
+        for texture in self._textures:
+            texture.release()
+
+
+def _face_records(geometry: Geometry, faces: slice) -> Array:
+    """What lib/surface/surface.glsl reads of faces: normal and material's number, float32 (n, 4)."""
+    return np.column_stack([geometry.face_normals[faces], geometry.face_materials[faces]]).astype("f4")
+
+
+def _runs(numbers: Ints) -> list[slice]:
+    """Ascending numbers (n,) as ranges without a gap."""
+    parts = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
+    return [slice(int(part[0]), int(part[-1]) + 1) for part in parts if len(part)]
+
+
+def _ranges(scene: Scene) -> list[tuple[int | None, int, int]]:
+    """(texture, first face, count) of each run of faces with one texture; loading sorts faces by texture."""
+    textures = np.array([-1 if m.texture is None else m.texture for m in scene.materials])
+    of_face = textures[scene.geometry.face_materials]
+    starts = np.flatnonzero(np.diff(of_face, prepend=of_face[0] - 1))
+    ends = np.append(starts[1:], len(of_face))
+    return [
+        (None if of_face[start] < 0 else int(of_face[start]), int(start), int(end - start))
+        for start, end in zip(starts, ends, strict=True)
+    ]

@@ -1,0 +1,103 @@
+"""Which VPLs may light which tiles of the screen, by the depths that a tile shows. No OpenGL.
+
+What a tile's pixels show lies in a frustum: the tile's pyramid between its smallest and its largest depth. A VPL that
+has this frustum behind it, or outside the pyramid about its cone, adds exactly nothing to any of them.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Bools, Ints
+from deferred_ir.frame.light_culling import MARGIN, shining
+from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
+
+EDGE = 64
+"""Of a tile, pixels: a software driver's own. Smaller ones skip a few more VPLs, and cost more draws than that wins."""
+
+ALIGNED = 16
+"""Lists of lights begin at multiples of so many records: 1280 bytes, since uniform blocks begin at multiples of 256."""
+FEWEST = 8
+"""Fewer VPLs are not worth it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tiles:
+    """Tiles that show a surface. rectangles: int (t, 4), x, y, width and height; corners: float32 (8, t, 3), world."""
+
+    rectangles: Ints
+    corners: Array
+    margin: Array
+
+    @classmethod
+    def of(cls, depth: Array, camera: Camera, near: float) -> Tiles:
+        """From reversed depths (H, W), bottom row first, 0 where there is no surface. near: the near plane."""
+        height, width = depth.shape
+        columns, rows = (np.arange(0, length, EDGE) for length in (width, height))
+        farthest = np.where(depth > 0, depth, np.inf)
+        low = np.minimum.reduceat(np.minimum.reduceat(farthest, rows), columns, axis=1)
+        high = np.maximum.reduceat(np.maximum.reduceat(depth, rows), columns, axis=1)
+        y, x = np.nonzero(high > 0)
+        left, bottom = columns[x], rows[y]
+        right, top = np.minimum(left + EDGE, width), np.minimum(bottom + EDGE, height)
+        a, b, c = camera.ray_axes((width, height))
+        sides = [side / width * 2 - 1 for side in (left, right)], [side / height * 2 - 1 for side in (bottom, top)]
+        ends = near / high[y, x], near / low[y, x]
+        offsets = np.stack(
+            [
+                (np.multiply.outer(u, a) + np.multiply.outer(v, b) + c) * z[:, None].astype(float)
+                for u, v, z in itertools.product(*sides, ends)
+            ]
+        )
+        rectangles = np.column_stack([left, bottom, right - left, top - bottom])
+        reach = np.abs(offsets).max(axis=(0, 2)) + np.abs(camera.position).max()
+        return cls(rectangles, (offsets + camera.position).astype(np.float32), (MARGIN * reach).astype(np.float32))
+
+    def lit(self, vpls: np.ndarray) -> Bools:
+        """Which tiles each of the VPLs, LIGHT records (n,), may light, bool (t, n)."""
+        x, y, z = (vpls[axis] for axis in ("x_axis", "y_axis", "z_axis"))
+        position = vpls["position"]
+        slack = self.margin[:, None] + np.float32(MARGIN) * np.abs(position).max(axis=1)
+        lit = np.ones((len(self.rectangles), len(vpls)), bool)
+        for normal in (z, z + x, z - x, z + y, z - y):
+            front = (self.corners @ normal.T).max(axis=0) - (normal * position).sum(axis=1)
+            lit &= front > -slack * np.linalg.norm(normal, axis=1)
+        return lit
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One draw: a tile, and where in the packed records its lights begin, which is to be the first and how many."""
+
+    rectangle: tuple[int, int, int, int]
+    start: int
+    first: int
+    count: int
+
+
+def draws(tiles: Tiles, records: np.ndarray) -> tuple[np.ndarray, list[Draw]]:
+    """Lists of lights for the tiles, from LIGHT records (n,), the spotlight first: packed records, and draws.
+
+    A tile has a draw for each block of the buffer in which a VPL may light it, with these VPLs in their order, so that
+    its sums are the same; the first block's has the spotlight in any case. Lists begin at multiples of 256 bytes, and
+    have a whole block of records behind them.
+    """
+    chosen = tiles.lit(records[1:]) & shining(records[1:])
+    rows, made, end = [], list[Draw](), 0
+    for start in range(0, len(records), LIGHTS_PER_BLOCK):
+        first = int(start == 0)
+        block = chosen[:, max(start - 1, 0) : start - 1 + LIGHTS_PER_BLOCK]
+        for rectangle, some in zip(tiles.rectangles.tolist(), block, strict=True):
+            lights = np.flatnonzero(some) + start + first
+            if not first and not len(lights):
+                continue
+            listed = np.concatenate([[0], lights]) if first else lights
+            made.append(Draw(tuple(rectangle), end, first, len(listed)))
+            rows += [listed, np.zeros(-len(listed) % ALIGNED, int)]
+            end += len(listed) + len(rows[-1])
+    rows.append(np.zeros(LIGHTS_PER_BLOCK, int))
+    return records[np.concatenate(rows)], made

@@ -1,0 +1,126 @@
+"""One OpenGL context with what every user of it needs: moderngl's view, the raw functions, limits and samplers."""
+
+from __future__ import annotations
+
+import os
+from functools import cached_property
+from typing import Any
+
+from deferred_ir.gl import devices, raw
+from deferred_ir.gl.debug import SWITCH, DebugOutput
+from deferred_ir.gl.devices import Loader
+
+
+class Gpu:
+    """A context on a device (see devices.create_context), current in the thread that made it. Close it when done.
+
+    window: the context of a window, which is current, instead of a headless one; closing leaves it to the window.
+    """
+
+    def __init__(self, device: str = "auto", window: Loader | None = None) -> None:
+        self._headless = window is None
+        opened = devices.create_context(device) if window is None else devices.adopt(window)
+        self.ctx, self._loader, self.device = opened
+        self.gl = raw.GL(self._loader)
+        if os.environ.get(SWITCH):
+            self.gl.debug = DebugOutput(self.ctx, self.gl)
+        extensions = self.ctx.extensions
+        self.layer_from_vertex = "GL_ARB_shader_viewport_layer_array" in extensions
+        self.clip_control = "GL_ARB_clip_control" in extensions or self.ctx.version_code >= 450
+        if self.clip_control:
+            self.gl.ClipControl(raw.LOWER_LEFT, raw.ZERO_TO_ONE)
+        self._clipped = 0
+        self._uniforms: Any = None
+        self._samplers: dict[tuple[bool, str | None, bool], Any] = {}
+
+    @cached_property
+    def max_size(self) -> int:
+        """Largest width or height of a render target."""
+        texture = self.gl.integers(raw.MAX_TEXTURE_SIZE)
+        return min(*texture, *self.gl.integers(raw.MAX_VIEWPORT_DIMS, 2))
+
+    @cached_property
+    def max_layers(self) -> int:
+        """Most layers of an array texture."""
+        return self.gl.integers(raw.MAX_ARRAY_LAYERS)[0]
+
+    @property
+    def defines(self) -> dict[str, int]:
+        """What every shader must know of the driver."""
+        return {"CLIP_CONTROL": int(self.clip_control), "LAYER_FROM_VERTEX": int(self.layer_from_vertex)}
+
+    def sampler(self, linear: bool, compare: str | None = None, repeat: bool = False) -> Any:
+        """A sampler object, shared: filter and comparison belong to the reader, never to the texture."""
+        key = (linear, compare, repeat)
+        if key not in self._samplers:
+            name = self.ctx.LINEAR if linear else self.ctx.NEAREST
+            sampler = self.ctx.sampler(repeat_x=repeat, repeat_y=repeat, filter=(name, name))
+            if compare:
+                sampler.compare_func = compare
+            self._samplers[key] = sampler
+        return self._samplers[key]
+
+    def reset(self) -> None:
+        """The state that each pass starts from: no tests, no clipping, no blending, all writes on."""
+        ctx = self.ctx
+        ctx.disable(ctx.DEPTH_TEST | ctx.CULL_FACE | ctx.BLEND)
+        self.clip(0)
+        self.scissor(None)
+        self.gl.DepthMask(1)
+        self.gl.ColorMask(1, 1, 1, 1)
+
+    def scissor(self, rectangle: tuple[int, int, int, int] | None) -> None:
+        """Draw into x, y, width, height alone, or everywhere again."""
+        if rectangle is None:
+            self.ctx.disable_direct(raw.SCISSOR_TEST)
+        else:
+            self.ctx.enable_direct(raw.SCISSOR_TEST)
+            self.gl.Scissor(*rectangle)
+
+    def uniforms(self, data: bytes) -> Any:
+        """A buffer that begins with `data`, until the next call; `free_uniforms` gives it back."""
+        if self._uniforms is None:
+            self._uniforms = self.ctx.buffer(reserve=len(data), dynamic=True)
+        self._uniforms.orphan(max(len(data), self._uniforms.size))
+        self._uniforms.write(data)
+        return self._uniforms
+
+    def free_uniforms(self) -> None:
+        """Give that buffer back, if there is one."""
+        if self._uniforms is not None:
+            self._uniforms.release()
+            self._uniforms = None
+
+    @property
+    def nbytes(self) -> int:
+        """Of that buffer."""
+        return self._uniforms.size if self._uniforms else 0
+
+    def barrier(self) -> None:
+        """Let later draws, uploads and reads see what shaders stored into images so far."""
+        self.gl.MemoryBarrier(
+            raw.IMAGE_ACCESS_BARRIER | raw.TEXTURE_FETCH_BARRIER | raw.TEXTURE_UPDATE_BARRIER | raw.FRAMEBUFFER_BARRIER
+        )
+
+    def check(self, where: str) -> None:
+        """With debug output on (DEFERRED_IR_DEBUG): raise DeviceError if OpenGL has complained."""
+        if self.gl.debug:
+            self.gl.debug.check(where)
+
+    def clip(self, count: int) -> None:
+        """Clip by the first `count` of gl_ClipDistance, and by no other."""
+        for side in range(min(count, self._clipped), max(count, self._clipped)):
+            (self.ctx.enable_direct if count > side else self.ctx.disable_direct)(raw.CLIP_DISTANCE0 + side)
+        self._clipped = count
+
+    def close(self) -> None:
+        """Destroy the context and all that lives in it; a window's own is left to the window."""
+        with self.ctx:  # names mean something else in whichever context is current
+            for sampler in self._samplers.values():
+                sampler.release()
+            self.free_uniforms()
+        if self._headless:
+            devices.close(self.ctx, self._loader)
+        else:
+            self.ctx.release()
+        self.check("closing")

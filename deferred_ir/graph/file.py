@@ -1,0 +1,187 @@
+"""Graph files: TOML to a Graph, with `extends`, and `--set` on top. Files never import code.
+
+A pass's type is the name of its module in `passes/`, or of a class that the caller hands over.
+"""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import importlib
+import json
+import os
+import pkgutil
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from deferred_ir.base.errors import GraphError, did_you_mean, shown
+from deferred_ir.base.toml_tables import DEEPEST, too_deep
+from deferred_ir.graph import params
+from deferred_ir.graph.graph import Graph, Node, Pass
+
+PASSES = "deferred_ir.passes"
+GRAPHS = "deferred_ir.passes.graphs"
+RESERVED = ("type", "inputs")
+
+
+def graph_names() -> list[str]:
+    """The graphs that can be named without a path."""
+    return sorted(path.stem for path in _graphs_folder().glob("*.toml"))
+
+
+def load_graph(
+    name: str | Path,
+    settings: Mapping[str, Any] | None = None,
+    passes: Mapping[str, type[Pass]] | None = None,
+) -> Graph:
+    """The graph `name` (a built-in name or a path), with `settings` {"pass.param": value} laid over it.
+
+    `passes` are the caller's own pass classes by type name. Raises one GraphError that lists all faults of the file.
+    """
+    path = _find(str(name), None)
+    table = _read(path, ())
+    faults: list[str] = []
+    tables = table.get("passes", {})
+    _apply(tables, settings or {}, faults)
+    nodes = {n: node for n, t in tables.items() if (node := _node(n, t, passes or {}, faults))}
+    outputs = table.get("outputs", {})
+    if not isinstance(outputs, dict) or not all(isinstance(source, str) for source in outputs.values()):
+        faults.append('outputs: wants name = "pass.port" lines')
+    elif not outputs:
+        faults.append('outputs: none; add a table [outputs] with radiance = "pass.port"')
+    faults += [f"{key}: no such key{did_you_mean(key, KEYS)}" for key in table if key not in KEYS]
+    if faults:
+        told = " ".join("; ".join(faults).split())  # a key may hold a line break
+        raise GraphError(f"{path.name}: {told}")
+    return Graph(nodes, outputs, path.name)
+
+
+KEYS = ("extends", "outputs", "passes")
+
+
+def graph_files(name: str | Path) -> list[Path]:
+    """The file of the graph `name` and those that it extends; up to the first that cannot be read."""
+    found: list[Path] = []
+    try:
+        path: Path | None = _find(str(name), None)
+        while path and path not in found:
+            found.append(path)
+            base = tomllib.loads(path.read_text(encoding="utf-8")).get("extends")
+            path = _find(base, path.parent) if isinstance(base, str) else None
+    except (GraphError, OSError, ValueError):  # whoever loads the graph says what is wrong
+        return found
+    return found
+
+
+def graph_hash(graph: Graph) -> str:
+    """First 16 hex digits of SHA-256 over the wiring and all parameters."""
+    nodes = {n.name: [type(n.work).__name__, repr(n.work.params), dict(n.inputs)] for n in graph.nodes.values()}
+    text = json.dumps([nodes, dict(graph.outputs)], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def pass_types() -> list[str]:
+    """Names of the passes that come with the package."""
+    return sorted(m.name for m in pkgutil.iter_modules(importlib.import_module(PASSES).__path__) if not m.ispkg)
+
+
+def _graphs_folder() -> Path:
+    return Path(importlib.import_module(GRAPHS).__path__[0])
+
+
+def _find(name: str, beside: Path | None) -> Path:
+    """A built-in graph by name, else a path (relative to the file that extends it)."""
+    if name in graph_names():
+        return _graphs_folder() / f"{name}.toml"
+    path = Path(name) if beside is None else beside / name
+    if os.path.isfile(path):  # unlike Path.is_file it does not raise for names that the system cannot have
+        return path
+    if path.suffix == ".toml":
+        raise GraphError(f"{name}: no such graph file; built-in graphs: {', '.join(graph_names())}")
+    raise GraphError(f"graph '{name}': no such graph{did_you_mean(name, graph_names())}")
+
+
+def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
+    """The file's tables over those of the file that it extends."""
+    if path.resolve() in above:
+        raise GraphError(
+            f"{path.name}: extends itself; remove 'extends' from one of: {', '.join(p.name for p in above)}"
+        )
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise GraphError(f"{path.name}: cannot be read: {error}") from error
+    except (ValueError, RecursionError) as error:  # bad TOML, or too long or too deeply nested for Python
+        raise GraphError(f"{path.name}: not TOML: {error}") from error
+    if too_deep(table):
+        raise GraphError(f"{path.name}: tables and arrays nested deeper than {DEEPEST}; flatten them")
+    if not isinstance(table.get("passes", {}), dict):
+        raise GraphError(f"{path.name}: passes: wants a table [passes.NAME] for each pass")
+    if "extends" not in table:
+        return table
+    if not isinstance(table["extends"], str):
+        raise GraphError(f"{path.name}: extends: wants the name or path of a graph")
+    base = _read(_find(table["extends"], path.parent), (*above, path.resolve()))
+    removed = [name for name, value in table.get("passes", {}).items() if value is False]
+    for name in removed:
+        if name not in base.get("passes", {}):
+            known = base.get("passes", {})
+            raise GraphError(f"{path.name}: passes.{name}: nothing to remove{did_you_mean(name, known)}")
+        del base["passes"][name], table["passes"][name]
+    return _cut(_overlay(base, {key: value for key, value in table.items() if key != "extends"}))
+
+
+def _overlay(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
+    """`top` over `base`, table by table."""
+    result = copy.deepcopy(base)
+    for key, value in top.items():
+        both = isinstance(value, dict) and isinstance(result.get(key), dict)
+        result[key] = _overlay(result[key], value) if both else copy.deepcopy(value)
+    return result
+
+
+def _cut(table: dict[str, Any]) -> dict[str, Any]:
+    """`table` without the inputs and outputs that an extending file has set to false."""
+    wirings = [table.get("outputs")]
+    wirings += [entry.get("inputs") for entry in table.get("passes", {}).values() if isinstance(entry, dict)]
+    for wires in wirings:
+        if isinstance(wires, dict):
+            for port in [port for port, source in wires.items() if source is False]:
+                del wires[port]
+    return table
+
+
+def _apply(tables: dict[str, Any], settings: Mapping[str, Any], faults: list[str]) -> None:
+    """Lay `pass.param` settings over the tables of the passes."""
+    for key, value in settings.items():
+        name, dot, parameter = key.partition(".")
+        if not dot or parameter in RESERVED:
+            faults.append(f"set {key}: wants pass.param = value")
+        elif not isinstance(tables.get(name), dict):
+            faults.append(f"set {key}: no pass '{name}' in this graph{did_you_mean(name, tables)}")
+        else:
+            tables[name][parameter] = value
+
+
+def _node(name: str, table: Any, passes: Mapping[str, type[Pass]], faults: list[str]) -> Node | None:
+    if not isinstance(table, dict):
+        faults.append(f"passes.{name}: wants a table of parameters and inputs")
+        return None
+    kind, inputs = table.get("type", name), table.get("inputs", {})
+    if not isinstance(kind, str):
+        faults.append(f"passes.{name}.type: is {shown(kind)}, but wants the name of a pass type in quotes")
+        return None
+    if not isinstance(inputs, dict) or not all(isinstance(source, str) for source in inputs.values()):
+        faults.append(f'passes.{name}.inputs: wants {{ port = "pass.port" }}')
+        return None
+    if kind in passes:
+        work = passes[kind]
+    elif kind in pass_types():
+        work = importlib.import_module(f"{PASSES}.{kind}").PASS
+    else:
+        faults.append(f"passes.{name}: no pass type '{kind}'{did_you_mean(kind, [*pass_types(), *passes])}")
+        return None
+    values = {key: value for key, value in table.items() if key not in RESERVED}
+    return Node(name, work(params.parse(work.Params, values, name, faults)), inputs)

@@ -1,0 +1,90 @@
+"""`load`: from the name of a built-in scene, a scene file or a model file to a `Scene`."""
+
+from __future__ import annotations
+
+import os
+from importlib.resources import files
+from pathlib import Path
+
+from deferred_ir.base.errors import SceneError, did_you_mean
+from deferred_ir.loading import default_views, merge, models, scene_file
+from deferred_ir.loading.models import ModelData
+from deferred_ir.loading.scene_file import ModelEntry, SceneFile
+from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.scene import Scene
+
+ANY_CAMERA = Camera((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+ANY_LIGHT = Spotlight((0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+"""Stand-ins until `fit` has chosen."""
+
+
+def builtin_scenes() -> tuple[tuple[str, str], ...]:
+    """Name and one-line description of each built-in scene, by name; the description is its file's first comment."""
+    return tuple((path.stem, _description(path)) for path in sorted(_folder().glob("*.toml")))
+
+
+def load(scene: str | os.PathLike[str]) -> Scene:
+    """Load a built-in scene by name, else a scene file (.toml), else a model file of any format that trimesh reads.
+
+    Raises SceneError: one line that names the file, the key and the mend.
+    """
+    path = _found(os.fspath(scene))
+    is_scene_file = path.suffix.lower() == ".toml"
+    described = scene_file.read(path) if is_scene_file else SceneFile(path.stem, (ModelEntry(path),))
+    read = [
+        (_model(entry, path, index, len(described.models)), entry.motion)
+        for index, entry in enumerate(described.models)
+    ]
+    geometry, materials, textures, ranges = merge.merge(read, str(path))
+    notes = tuple(dict.fromkeys(note for model, _ in read for note in model.notes))
+    result = Scene(
+        name=described.name,
+        path=path,
+        geometry=geometry,
+        materials=materials,
+        textures=textures,
+        models=ranges,
+        camera=described.camera or ANY_CAMERA,
+        spotlight=described.spotlight or ANY_LIGHT,
+        render=described.render,
+        notes=notes,
+    )
+    return default_views.fitted(result, camera=described.camera is None, spotlight=described.spotlight is None)
+
+
+def _model(entry: ModelEntry, path: Path, index: int, count: int) -> ModelData:
+    """The model of an entry; an error says which entry of which scene file names it."""
+    try:
+        return models.read(entry.path, entry.scale, entry.translate, root=path.parent)
+    except SceneError as error:
+        if entry.path == path:
+            raise
+        key = "model.path" if count == 1 else f"model[{index}].path"
+        raise SceneError(f"{path}: {key}: {error}") from error
+
+
+def _folder() -> Path:
+    return Path(str(files("deferred_ir.scenes")))
+
+
+def _description(path: Path) -> str:
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.startswith("#"):
+            return line.lstrip("# ").strip()
+    return ""
+
+
+def _found(name: str) -> Path:
+    """The file that `name` means; a built-in name wins over a file of that name."""
+    names = [path.stem for path in _folder().glob("*.toml")]
+    if name in names:
+        return _folder() / f"{name}.toml"
+    path = Path(name)
+    if os.path.isdir(name):
+        raise SceneError(f"{name}: is a folder; give a scene file or a model in it")
+    if os.path.isfile(name):
+        return path
+    if path.suffix or path.name != name:
+        raise SceneError(f"{name}: no such file; give a scene file, a model, or a built-in scene ({', '.join(names)})")
+    raise SceneError(f"{name}: no such file and no built-in scene of that name{did_you_mean(name, names)}")

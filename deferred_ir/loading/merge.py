@@ -1,0 +1,72 @@
+"""Joins the parts of all models into the arrays of one scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array
+from deferred_ir.base.errors import SceneError
+from deferred_ir.loading.models import ModelData, Part
+from deferred_ir.scene.geometry import Geometry, Model
+from deferred_ir.scene.motion import ModelMotion
+from deferred_ir.scene.scene import Material, Texture
+
+
+def merge(
+    models: Sequence[tuple[ModelData, ModelMotion | None]], file: str
+) -> tuple[Geometry, tuple[Material, ...], tuple[Texture, ...], tuple[Model, ...]]:
+    """Geometry, materials, textures and vertex ranges of all models; `file` is what an error message names.
+
+    Equal materials and equal images become one. Vertices stay in the order of models and parts; faces are sorted by
+    texture, otherwise in that order too. Raises SceneError where everything lies in one point.
+    """
+    materials: dict[Material, int] = {}
+    textures: dict[tuple[tuple[int, ...], bytes], tuple[int, Texture]] = {}
+    parts = [part for model, _ in models for part in model.parts]
+    counts = [len(part.positions) for part in parts]
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    if starts[-1] >= 2**31:
+        raise SceneError(f"{file}: {starts[-1]} vertices are more than 32-bit indices reach; give smaller models")
+    face_materials, face_textures = [], []
+    for part in parts:
+        texture = -1
+        if part.texture is not None:
+            pixels = part.texture.pixels
+            texture, _ = textures.setdefault((pixels.shape, pixels.tobytes()), (len(textures), part.texture))
+        material = Material(part.material.name, part.material.albedo, None if texture < 0 else texture)
+        face_materials.append(np.full(len(part.faces), materials.setdefault(material, len(materials))))
+        face_textures.append(np.full(len(part.faces), texture))
+    order = np.argsort(np.concatenate(face_textures), kind="stable")
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])
+    ranges, first = [], 0
+    for model, motion in models:
+        count = sum(len(part.positions) for part in model.parts)
+        ranges.append(Model(model.name, first, count, motion))
+        first += count
+    geometry = Geometry(
+        positions=np.concatenate([part.positions for part in parts]),
+        faces=faces[order].astype(np.int32),
+        face_materials=np.concatenate(face_materials)[order].astype(np.int32),
+        normals=_joined(parts, lambda part: part.normals, np.zeros(3)),
+        uvs=_joined(parts, lambda part: part.uvs, np.zeros(2)),
+        colors=_joined(parts, lambda part: part.colors, np.ones(3)),
+        moving=tuple(model for model in ranges if model.motion),
+    )
+    low, high = geometry.bounds
+    if np.linalg.norm(high - low) <= 1e-12 * float(np.abs(geometry.bounds).max()):
+        raise SceneError(f"{file}: all vertices lie in one point (to 64-bit floats); scale or move the model")
+    return geometry, tuple(materials), tuple(texture for _, texture in textures.values()), tuple(ranges)
+
+
+def _joined(parts: list[Part], pick: Callable[[Part], Array | None], filler: Array) -> Array | None:
+    """What `pick` takes of all parts, float32, with rows of `filler` where a part has none; None if no part has any."""
+    picked = [pick(part) for part in parts]
+    if all(array is None for array in picked):
+        return None
+    rows = [
+        np.tile(filler, (len(part.positions), 1)) if array is None else array
+        for part, array in zip(parts, picked, strict=True)
+    ]
+    return np.concatenate(rows).astype(np.float32)

@@ -1,0 +1,136 @@
+"""What trimesh passes over in OBJ and MTL files, mended before it reads them.
+
+trimesh knows one `mtllib`, finds the word even in a comment, counts negative indices from the end of the whole file,
+skips missing materials and images without a word, and rounds Kd to 8 bits.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from deferred_ir.base.errors import SceneError
+from deferred_ir.loading.asset_paths import Assets, without_options
+
+MATERIALS = "materials.mtl"
+"""Name under which all materials of a model are handed to trimesh."""
+
+
+@dataclass(frozen=True)
+class MtlMaterial:
+    """What we take of a material: the numbers of Kd (unrounded, may be none), its image, and whether it emits."""
+
+    kd: tuple[float, ...] = ()
+    image: str | None = None
+    emits: bool = False
+
+
+@dataclass(frozen=True)
+class ObjFile:
+    """An OBJ file made ready: text for trimesh, its assets, its materials by name, and notes."""
+
+    text: bytes
+    assets: Assets
+    materials: dict[str, MtlMaterial]
+    notes: tuple[str, ...]
+
+
+def read(path: Path, data: bytes, root: Path | None = None) -> ObjFile:
+    """Make the OBJ file `data` at `path` ready for trimesh; all its material libraries become one.
+
+    root: see Assets.
+    """
+    text = _decoded(data)
+    assets = Assets([path.parent], root=root)
+    libraries, notes = [], []
+    for names in re.findall(r"^[ \t]*mtllib[ \t]+(.*)", text, re.MULTILINE):
+        for name in _library_names(names.strip(), assets):
+            found = assets.path(name)
+            if found is None:
+                notes.append(f"{path.name}: its material file {name} is missing")
+                continue
+            libraries.append(_decoded(found.read_bytes()))
+            if found.parent not in assets.folders:
+                assets.folders.append(found.parent)
+    materials = _materials("\n".join(libraries))
+    # A value that trimesh does not expect, of whatever key, would cost it all materials: it gets names and images only.
+    lines = ((f"newmtl {name}", f"map_Kd {m.image}" if m.image else "") for name, m in materials.items())
+    assets.blobs[MATERIALS] = "\n".join(line for pair in lines for line in pair).encode()
+    used = {" ".join(name.split()) for name in re.findall(r"^usemtl[ \t]+(.*)", text, re.MULTILINE)}
+    if missing := sorted(used - materials.keys()):
+        notes.append(f"{path.name}: no material {', '.join(missing)}; its surfaces are grey")
+    text = re.sub(r"^.*\bmtllib\b.*$", "", text, flags=re.MULTILINE)
+    text = f"mtllib {MATERIALS}\n{_with_absolute_indices(text)}"
+    if re.search(r"^f[^\n#]*[ \t/](0+|-\d+)(?![\d.])", text, re.MULTILINE):
+        raise SceneError(
+            f"{path}: a face has index 0, or one before the first vertex; export it again, counting from 1"
+        )
+    return ObjFile(text.encode(), assets, materials, tuple(notes))
+
+
+def _decoded(data: bytes) -> str:
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _library_names(names: str, assets: Assets) -> list[str]:
+    """The files of one `mtllib` line: one name with spaces, or several names."""
+    return [names] if assets.path(names) or " " not in names else names.split()
+
+
+def _materials(mtl: str) -> dict[str, MtlMaterial]:
+    """The materials of an MTL text by name; of two of one name the later counts."""
+    materials: dict[str, MtlMaterial] = {}
+    name = ""
+    for line in mtl.splitlines():
+        key, *rest = line.split(maxsplit=1) or [""]
+        key, value = key.lower(), rest[0] if rest else ""
+        if key == "newmtl":
+            name = " ".join(value.split())
+            materials[name] = MtlMaterial()
+        elif name and key == "kd":
+            materials[name] = replace(materials[name], kd=_numbers(value))
+        elif name and key == "map_kd" and value.strip():
+            materials[name] = replace(materials[name], image=without_options(value).strip())
+        elif name and key == "ke":
+            materials[name] = replace(materials[name], emits=any(number > 0 for number in _numbers(value)))
+    return materials
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    """The numbers of a line up to a comment; none where something else stands there, such as `spectral file.rfl`."""
+    try:
+        return tuple(float(word) for word in text.partition("#")[0].split())
+    except ValueError:
+        return ()
+
+
+def _with_absolute_indices(text: str) -> str:
+    """The text with negative face indices, which count back from the latest vertex, turned into plain ones."""
+    if not re.search(r"^[ \t]*f[^\n#]*[ \t/]-\d", text, re.MULTILINE):
+        return text
+    counts = {"v": 0, "vt": 0, "vn": 0}
+    lines = text.split("\n")
+    for number, line in enumerate(lines):
+        words = line.split()
+        if not words:
+            continue
+        if words[0] in counts:
+            counts[words[0]] += 1
+        elif words[0] == "f":
+            totals = tuple(counts.values())
+            lines[number] = " ".join(["f", *(_absolute(word, totals) for word in words[1:])])
+    return "\n".join(lines)
+
+
+def _absolute(reference: str, totals: tuple[int, ...]) -> str:
+    """One vertex of a face, such as `-4/-4/-1`, with the numbers of vertices, uvs and normals so far."""
+    parts = reference.split("/")
+    for place, (part, total) in enumerate(zip(parts, totals, strict=False)):
+        if re.fullmatch(r"-\d+", part):
+            parts[place] = str(total + 1 + int(part))
+    return "/".join(parts)

@@ -1,0 +1,248 @@
+"""Reads the TOML scene file into plain checked values; docs/scene-file.md says what the keys mean.
+
+Nothing of the file is run, and no model is opened here.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from deferred_ir.base.arrays import Vec3
+from deferred_ir.base.errors import SceneError, did_you_mean, shown
+from deferred_ir.base.toml_tables import DEEPEST, Faults, Table, too_deep
+from deferred_ir.scene.camera import Camera, view_fault
+from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.motion import CameraMotion, KeyframedSpotlight, LissajousMotion, ModelMotion, SpotlightMotion
+from deferred_ir.scene.scene import RenderDefaults
+
+KINDS = ("lissajous", "keyframes")
+SIZE = re.compile(r"\s*(\d{1,9})\s*[xX]\s*(\d{1,9})\s*")
+NAME = re.compile(r"[^/\\%\x00-\x1f\x7f]{1,100}")
+
+
+@dataclass(frozen=True)
+class ModelEntry:
+    """One [[model]]: the file (resolved against the scene file's folder), `scale`, then `translate`."""
+
+    path: Path
+    scale: float = 1.0
+    translate: Vec3 = (0.0, 0.0, 0.0)
+    motion: ModelMotion | None = None
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """What a scene file says; camera and spotlight are None where it leaves them out."""
+
+    name: str
+    models: tuple[ModelEntry, ...]
+    camera: Camera | None = None
+    spotlight: Spotlight | None = None
+    render: RenderDefaults = field(default_factory=RenderDefaults)
+
+
+def read(path: Path) -> SceneFile:
+    """Read and check a scene file. Raises SceneError: one line with all faults, each with its key and the mend."""
+    faults = Faults(str(path))
+    try:
+        data = tomllib.loads(path.read_bytes().decode())
+    except OSError as error:
+        raise SceneError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (ValueError, RecursionError) as error:  # bad TOML, bad UTF-8, nested beyond reason
+        raise SceneError(f"{path}: not a TOML file: {' '.join(str(error).split())}") from error
+    if too_deep(data):
+        raise SceneError(f"{path}: tables and arrays nested deeper than {DEEPEST}; flatten them")
+    root = Table(faults, "", data, ("name", "model", "camera", "spotlight", "render"))
+    name = root.string("name")
+    if name and not NAME.fullmatch(name):
+        root.fault("name", f"{shown(name)}: names pictures; leave slashes, percent and control characters out of it")
+    models = _models(root, path.parent)
+    camera, spotlight, render = _camera(root), _spotlight(root), _render(root, path.parent)
+    if faults.found:
+        faults.fail()
+    return SceneFile(name or path.stem, models, camera, spotlight, render)
+
+
+def parse_size(text: str) -> tuple[int, int] | None:
+    """(width, height) of a string such as "512x512"; None if it is none, or 0."""
+    match = SIZE.fullmatch(text)
+    if match is None or not (int(match[1]) and int(match[2])):
+        return None
+    return int(match[1]), int(match[2])
+
+
+def _models(root: Table, folder: Path) -> tuple[ModelEntry, ...]:
+    entries = root.data.get("model")
+    if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
+        what = "missing" if entries is None else "must be an array of tables"
+        root.fault("model", f'{what}; write [[model]] and, below it, path = "FILE"')
+        return ()
+    models = []
+    for index, entry in enumerate(entries):
+        name = "model" if len(entries) == 1 else f"model[{index}]"
+        table = Table(root.faults, name, entry, ("path", "scale", "translate", "motion"))
+        path = table.string("path", needed=True, mend="the model's file")
+        scale = table.number("scale", 1.0)
+        if scale <= 0:
+            table.fault("scale", f"must be above 0, not {scale}")
+        translate = table.vec3("translate", needed=False) or (0.0, 0.0, 0.0)
+        models.append(ModelEntry(folder / (path or ""), scale, translate, _model_motion(table)))
+    return tuple(models)
+
+
+def _model_motion(model: Table) -> ModelMotion | None:
+    table = model.table("motion", ("times", "translations", "rotations"))
+    if table is None:
+        return None
+    times = table.times()
+    translations = table.vec3s("translations", times)
+    quaternions = table.vectors("rotations", 4, times)
+    if times is None or translations is None or quaternions is None:
+        return None
+    rotations = []
+    for index, quaternion in enumerate(quaternions):
+        # Divided by the largest part first: squares of very small numbers would underflow.
+        size = max(abs(part) for part in quaternion)
+        if size == 0:
+            table.fault(f"rotations[{index}]", "a quaternion of zeros is no rotation; none is [0, 0, 0, 1]")
+            return None
+        length = math.hypot(*(part / size for part in quaternion))
+        x, y, z, w = (part / size / length for part in quaternion)
+        rotations.append((x, y, z, w))
+    return ModelMotion(times, translations, tuple(rotations))
+
+
+def _camera(root: Table) -> Camera | None:
+    table = root.table("camera", ("position", "look_at", "up", "fov", "motion"))
+    if table is None:
+        return None
+    position, look_at = table.vec3("position"), table.vec3("look_at")
+    up = table.vec3("up", needed=False) or (0.0, 1.0, 0.0)
+    fov = _fov(table, Camera.fov)
+    motion = _camera_motion(table, up)
+    if position is None or look_at is None:
+        return None
+    _check_view(table, "look_at", position, look_at, up)
+    return Camera(position, look_at, up, fov, motion)
+
+
+def _camera_motion(camera: Table, up: Vec3) -> CameraMotion | None:
+    table = camera.table("motion", ("times", "positions", "look_ats"))
+    path = _keyframes(table) if table else None
+    if table is None or path is None:
+        return None
+    for index, (position, look_at) in enumerate(zip(path.positions, path.look_ats, strict=True)):
+        _check_view(table, f"look_ats[{index}]", position, look_at, up)
+    return path
+
+
+def _spotlight(root: Table) -> Spotlight | None:
+    table = root.table("spotlight", ("position", "look_at", "fov", "emission", "radius", "motion"))
+    if table is None:
+        return None
+    position, look_at, emission = table.vec3("position"), table.vec3("look_at"), table.vec3("emission")
+    fov, radius = _fov(table, Spotlight.fov), table.number("radius", 0.0)
+    if emission is not None and min(emission) < 0:
+        table.fault("emission", f"must be 0 or more, not {shown(list(emission))}")
+    if radius < 0:
+        table.fault("radius", f"must be 0 or more, not {radius}")
+    motion = _spotlight_motion(table)
+    if position is None or look_at is None or emission is None:
+        return None
+    light = Spotlight(position, look_at, fov, emission, radius, motion)
+    # Around a Lissajous figure's middle the light may well look at that.
+    _check_view(table, "look_at", light.at(0.0).position, light.at(0.0).look_at)
+    return light
+
+
+def _spotlight_motion(spotlight: Table) -> SpotlightMotion | None:
+    table = spotlight.table("motion", ("kind", "amplitude", "speed", "times", "positions", "look_ats"))
+    kind = table.string("kind", needed=True, mend=f"one of {', '.join(KINDS)}") if table else None
+    if table is None or kind is None:
+        return None
+    own = {"lissajous": ("amplitude", "speed"), "keyframes": ("times", "positions", "look_ats")}
+    if kind not in own:
+        table.fault("kind", f"unknown motion {shown(kind)}{did_you_mean(kind, KINDS)}")
+        return None
+    for key in table.data:
+        if key != "kind" and key not in own[kind] and any(key in keys for keys in own.values()):
+            table.fault(key, f'does not belong to kind = "{kind}"; take it away')
+    if kind == "lissajous":
+        amplitude, speed = table.vec3("amplitude"), table.vector("speed", 2)
+        return LissajousMotion(amplitude, (speed[0], speed[1])) if amplitude and speed else None
+    path = _keyframes(table)
+    if path is None:
+        return None
+    for index, (position, look_at) in enumerate(zip(path.positions, path.look_ats, strict=True)):
+        _check_view(table, f"look_ats[{index}]", position, look_at)
+    return KeyframedSpotlight(path.times, path.positions, path.look_ats)
+
+
+def _keyframes(table: Table) -> CameraMotion | None:
+    """Times, positions and look_ats; those of a spotlight have the same shape."""
+    times = table.times()
+    positions, look_ats = table.vec3s("positions", times), table.vec3s("look_ats", times)
+    if times is None or positions is None or look_ats is None:
+        return None
+    return CameraMotion(times, positions, look_ats)
+
+
+def _fov(table: Table, default: float) -> float:
+    fov = table.number("fov", default)
+    if not 0 < fov < 180:
+        table.fault("fov", f"must lie between 0 and 180 degrees, not {fov}")
+        return default
+    return fov
+
+
+def _check_view(table: Table, key: str, position: Vec3, look_at: Vec3, up: Vec3 | None = None) -> None:
+    """Note a fault where the view has no direction, or `up` lies along it; `key` is where the view stands."""
+    fault = view_fault(position, look_at, up)
+    if fault:
+        name, why = fault
+        table.fault(key if "[" in key or name == "look_at" else name, why)
+
+
+def _render(root: Table, folder: Path) -> RenderDefaults:
+    table = root.table("render", ("graph", "size", "vpls", "seed", "set"))
+    if table is None:
+        return RenderDefaults()
+    graph = table.string("graph")
+    if graph is not None and graph.endswith(".toml"):
+        graph = str(folder / graph)  # like a model's path, relative to the scene file
+    size = _size(table)
+    settings = table.data.get("set", {})
+    if not isinstance(settings, dict):
+        table.fault("set", f'must be a table such as {{"tonemap.exposure" = 1.0}}, not {shown(settings)}')
+        settings = {}
+    for key, value in settings.items():
+        _check_setting(table, key, value)
+    return RenderDefaults(graph, size, table.integer("vpls"), table.integer("seed"), settings)
+
+
+def _check_setting(table: Table, key: str, value: Any) -> None:
+    if isinstance(value, dict):
+        table.fault(f"set.{key}", f'write pass and parameter as one key in quotes: "{key}.parameter" = value')
+    elif not re.fullmatch(r"[^.\s]+\.[^.\s]+", key):
+        table.fault(f"set.{shown(key)}", 'must name pass and parameter, such as "tonemap.exposure"')
+    elif not isinstance(value, str | int | float) or (isinstance(value, float) and not math.isfinite(value)):
+        table.fault(f"set.{key}", f"must be a string, a finite number, true or false, not {shown(value)}")
+
+
+def _size(table: Table) -> tuple[int, int] | None:
+    value = table.data.get("size")
+    if value is None:
+        return None
+    if isinstance(value, list) and len(value) == 2:
+        whole = all(isinstance(side, int) and not isinstance(side, bool) and side > 0 for side in value)
+        size = (value[0], value[1]) if whole else None
+    else:
+        size = parse_size(value) if isinstance(value, str) else None
+    if size is None:
+        table.fault("size", f'must be "512x512" or [512, 512], 1 pixel or more, not {shown(value)}')
+    return size

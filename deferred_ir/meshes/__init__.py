@@ -1,0 +1,1 @@
+"""Triangles for shadow maps: clusters, levels of detail, subdivision. No OpenGL."""

@@ -1,0 +1,134 @@
+"""Triangles in clusters with bounding boxes, and which of them each light's map may show. No OpenGL."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Bools, Ints
+
+CLUSTER = 64
+"""Most triangles in a cluster."""
+OCTAVES = 10
+"""Triangles share a cluster whose longest edges are in one octave, down to 2^-OCTAVES of the longest of all."""
+ROUNDING = 2.0**-18
+"""Slack of the test against a plane, relative to the terms it adds: 64 roundings, this test's and the shader's."""
+
+EVERY = slice(None)
+
+
+class Clusters:
+    """Faces (F, 3) of `positions` (V, 3), grouped by where they are, and by `groups` (F,) if these are given.
+
+    order: int (F,), the faces of cluster 0, then of cluster 1, ... starts: int (C + 1,), where in `order` each begins.
+    reach: largest coordinate, without its sign.
+    A group is a range of clusters: those of lower numbers come first.
+    """
+
+    def __init__(self, positions: Array, faces: Ints, most: int = CLUSTER, groups: Ints | None = None) -> None:
+        corners = positions.astype(np.float32)[faces]
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        # Triangles of like size together: one large triangle would make its cluster bend in more maps than its own.
+        classes = _octaves(edges)
+        if groups is not None:
+            classes += groups * (OCTAVES + 1)
+        self.order, self.starts = split(low / 2 + high / 2, classes, most)
+        first = self.starts[:-1]
+        self._longest = np.maximum.reduceat(edges[self.order], first)
+        self._boxes = np.ones((7, len(first)), np.float32)
+        self._fit(slice(0, len(first)), low[self.order], high[self.order])
+
+    def _fit(self, chosen: slice, low: Array, high: Array) -> None:
+        """Put boxes about the clusters `chosen`; low, high (n, 3): of their faces, in order."""
+        at = self.starts[chosen] - self.starts[chosen.start]
+        low, high = np.minimum.reduceat(low, at), np.maximum.reduceat(high, at)
+        centre = low / 2 + high / 2
+        self._boxes[:3, chosen], self._boxes[3:6, chosen] = centre.T, np.maximum(high - centre, centre - low).T
+        self.reach = float((np.abs(self._boxes[:3]) + self._boxes[3:6]).max())
+
+    def move(self, chosen: slice, corners: Array) -> None:
+        """Let the clusters `chosen` follow their triangles, whose corners are (n, 3, 3) in their order, float32.
+
+        Triangles have to be what they were, but for a rigid motion.
+        """
+        self._fit(chosen, corners.min(axis=1), corners.max(axis=1))
+
+    def __len__(self) -> int:
+        return len(self.starts) - 1
+
+    @property
+    def sizes(self) -> Ints:
+        """Triangles of each cluster, int (C,)."""
+        return np.diff(self.starts)
+
+    def visible(self, lights: np.ndarray, *, hemisphere: bool = False) -> Bools:
+        """Which clusters may show in the maps of `lights`, LIGHT records (n,): bool (n, C).
+
+        A map shows what lies inside its pyramid; with `hemisphere` all that is in front of the light. A cluster that is
+        left out lies outside by more than roundings can move it, so its triangles would have covered no texel.
+        """
+        if len(self) == 1:
+            return np.ones((len(lights), 1), bool)
+        return self.within(lights, hemisphere=hemisphere)
+
+    def within(
+        self, lights: np.ndarray, *, hemisphere: bool = False, margin: float = 0.0, only: Ints | slice = EVERY
+    ) -> Bools:
+        """Which clusters, or which of `only`, may lie in the lights' pyramids or less than `margin` outside: (n, C)."""
+        x, y, z = (lights[axis] for axis in ("x_axis", "y_axis", "z_axis"))
+        position = lights["position"]
+        # What the dot products here and in the shader add up is no larger than this.
+        terms = (np.abs(x) + np.abs(y) + np.abs(z)).sum(axis=1) * (self.reach + np.abs(position).max(axis=1))
+        slack = terms * np.float32(ROUNDING)
+        boxes = self._boxes[:, only]
+        outside = np.zeros((len(lights), boxes.shape[1]), bool)
+        for normal in (z,) if hemisphere else (z, z + x, z - x, z + y, z - y):
+            offset = slack - (normal * position).sum(axis=1)
+            if margin > 0:
+                offset += np.float32(margin) * np.linalg.norm(normal, axis=1)
+            # The corner of the box that is farthest along the normal decides.
+            outside |= np.column_stack([normal, np.abs(normal), offset]) @ boxes < 0
+        return ~outside
+
+    def drawn(self, lights: np.ndarray) -> Bools:
+        """Which clusters make up the scene for each of `lights`, LIGHT records (n,), culled or not: bool (n, C)."""
+        return np.ones((len(lights), len(self)), bool)
+
+    def bent(self, lights: np.ndarray, reach: Array) -> Bools:
+        """Which clusters have an edge that may be closer to a light than `reach` (n,) times its length: bool (n, C)."""
+        centre, half = self._boxes[:3], self._boxes[3:6]
+        away = np.maximum(np.abs(lights["position"][:, :, None] - centre) - half, 0)
+        bent: Bools = (away**2).sum(axis=1) < (reach[:, None] * self._longest) ** 2
+        return bent
+
+
+def _octaves(edges: Array) -> Ints:
+    """Class of each triangle by its longest edge (F,): halves of the longest of all, down to 2^-OCTAVES."""
+    longest = edges.max()
+    shares = edges / longest if longest > 0 else edges
+    classes: Ints = np.ceil(np.log2(np.maximum(shares, 2.0**-OCTAVES))).astype(np.intp)
+    return classes
+
+
+def split(points: Array, classes: Ints, most: int) -> tuple[Ints, Ints]:
+    """Halve the `points` (n, 3) of each class across their longest extent until no part has more than `most`.
+
+    Returns order (n,) and starts.
+    """
+    order = np.argsort(classes, kind="stable")
+    bounds = [0, *(np.flatnonzero(np.diff(classes[order])) + 1).tolist(), len(points)]
+    starts, ahead = [len(points)], list(itertools.pairwise(bounds))
+    while ahead:
+        start, end = ahead.pop()
+        if end - start <= most:
+            starts.append(start)
+            continue
+        part = points[order[start:end]]
+        # Whole clusters on the left: then all but the last are full.
+        middle = -(-(end - start) // (2 * most)) * most
+        axis = np.ptp(part, axis=0).argmax()
+        order[start:end] = order[start:end][np.argpartition(part[:, axis], middle - 1)]
+        ahead += [(start, start + middle), (start + middle, end)]
+    return order, np.sort(starts)

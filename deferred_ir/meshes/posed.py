@@ -1,0 +1,83 @@
+"""Meshes that maps show, in clusters that follow the models that move. No OpenGL."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.meshes.clusters import Clusters
+from deferred_ir.scene.geometry import Geometry, carried, groups, middle
+
+
+@dataclass(frozen=True, eq=False)
+class MapMesh:
+    """Triangles that maps show: positions (V, 3), faces (F, 3), and whose vertices move, all at rest."""
+
+    positions: Array
+    faces: Ints
+    moving: tuple[slice, ...] = ()
+
+    @cached_property
+    def groups(self) -> Ints:
+        """Whose each face is, int (F,): 0 of what stands still, i + 1 of moving model i."""
+        return groups(self.faces, self.moving)
+
+    @cached_property
+    def local(self) -> Array:
+        """Positions, those of each moving model about its own middle: 32 bits are finest there."""
+        local = self.positions.copy()
+        for vertices in self.moving:
+            local[vertices] -= middle(local[vertices])
+        return local
+
+    @classmethod
+    def of(cls, geometry: Geometry) -> MapMesh:
+        """The triangles of a scene."""
+        rest = geometry.rest
+        return cls(rest.positions, rest.faces, tuple(model.vertices for model in rest.moving))
+
+    def clustered(self) -> Clusters:
+        """In clusters, none with triangles of two models that move apart. Those of moving models have no place yet."""
+        return Clusters(self.local, self.faces, groups=self.groups if self.moving else None)
+
+    def posed(self, clusters: Clusters, poses: Array) -> PosedMesh:
+        """In these clusters, its moving models brought from rest by `poses` (m, 4, 4)."""
+        return PosedMesh(self, clusters, poses)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A moving model: its vertices (n, 3) at rest, its clusters, and the corners of their faces, in order, in these."""
+
+    rest: Array
+    clusters: slice
+    corners: Ints
+
+    @classmethod
+    def of(cls, mesh: MapMesh, clusters: Clusters, number: int) -> _Part:
+        vertices, starts = mesh.moving[number], clusters.starts
+        whose = mesh.groups[clusters.order[starts[:-1]]]
+        first, last = np.searchsorted(whose, (number + 1, number + 2)).tolist()
+        faces = mesh.faces[clusters.order[starts[first] : starts[last]]]
+        return cls(mesh.positions[vertices], slice(first, last), faces - vertices.start)
+
+
+class PosedMesh:
+    """A mesh in clusters whose boxes are where its moving models are."""
+
+    def __init__(self, mesh: MapMesh, clusters: Clusters, poses: Array) -> None:
+        self.mesh, self.clusters = mesh, clusters
+        self._parts = [_Part.of(mesh, clusters, number) for number in range(len(mesh.moving))]
+        for number, pose in enumerate(poses):
+            self.move(number, pose)
+
+    def move(self, number: int, pose: Array) -> tuple[int, Array]:
+        """Bring moving model `number` from rest by `pose` (4, 4): its first vertex, and all of them, float32 (n, 3)."""
+        part = self._parts[number]
+        points = carried(part.rest, pose).astype(np.float32)
+        if part.clusters.stop > part.clusters.start:
+            self.clusters.move(part.clusters, points[part.corners])
+        return self.mesh.moving[number].start, points

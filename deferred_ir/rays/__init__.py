@@ -1,0 +1,1 @@
+"""Embree, and what rays tell of a scene."""

@@ -1,0 +1,103 @@
+"""Irradiance by the spotlight on surfaces, with ray-cast shadows: the formula of shaders/lib/lights/light.glsl."""
+
+from __future__ import annotations
+
+from contextlib import closing
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array
+from deferred_ir.base.parallel import in_order
+from deferred_ir.rays.pixel_surfaces import Surfaces
+from deferred_ir.rays.tracer import Hits, Tracer
+from deferred_ir.sampling import pixel_blocks
+from deferred_ir.sampling.patterns import disc
+from deferred_ir.scene.lights.spot import Spotlight, frames
+
+PIXELS = 1 << 13
+"""Pixels of a task: few enough for their arrays to stay in a core's cache."""
+
+GOLDEN_ANGLE = np.pi * (3 - 5**0.5)
+
+
+def lit_by(light: Spotlight, tracer: Tracer, at: Hits, rng: np.random.Generator) -> Array:
+    """Irradiance on surfaces `at` (n, all of them hit) divided by the spotlight's emission, float64 (n,).
+
+    A disc light is asked at one random point of its disc for each surface, a point light at its position.
+    """
+    points = disc(rng.random((len(at.face), 2))) if light.radius > 0 else None
+    return _arriving(light, tracer, at, points)
+
+
+def on_pixels(
+    tracer: Tracer,
+    light: Spotlight,
+    seen: Surfaces,
+    size: tuple[int, int],
+    *,
+    samples: int,
+    block: int,
+    seed: int = 0,
+    threads: int | None = None,
+) -> Array:
+    """Irradiance by the spotlight over its emission, float32 (H, W), bottom row first; 0 on the background.
+
+    Exact for a point light. Of a disc each pixel asks `samples` points, and those of block x block pixels (1, 2, 4 or
+    8 a side) are spread over it together; the mean over seeds is exact. The same for any number of threads.
+    """
+    width, height = size
+    image = np.zeros(height * width, np.float32)
+    tasks = [(i, slice(start, start + PIXELS)) for i, start in enumerate(range(0, len(seen.pixel), PIXELS))]
+    dealing = np.random.default_rng([seed, 0, 1])  # none of the streams of the near field's rays
+    _, index, cells = pixel_blocks.deal(seen.pixel, width, 1, block, int(dealing.integers(block * block)))
+    shift, grid = dealing.random(2), pixel_blocks.lattice(cells)
+
+    def work(task: tuple[int, slice]) -> Array:
+        number, rows = task
+        at = seen.rows(rows)
+        if light.radius == 0:
+            return _arriving(light, tracer, at, None)
+        places = pixel_blocks.jittered(index[rows, 0], grid, np.random.default_rng([seed, 1 + number, 1])) + shift
+        total = np.zeros(len(at.pixel))
+        for i in range(samples):
+            total += _arriving(light, tracer, at, _spiral(places % 1, i, samples))
+        return total / samples
+
+    with closing(in_order(work, tasks, threads)) as results:
+        for (_, rows), part in zip(tasks, results, strict=True):
+            image[seen.pixel[rows]] = part
+    return image.reshape(height, width)
+
+
+def _spiral(places: Array, i: int, count: int) -> Array:
+    """Point i of `count` that are spread over the unit disc, one set a row of `places` (n, 2) in [0, 1), (n, 2).
+
+    Vogel's spiral, turned by the first coordinate; the second says where in its ring of equal area a point lies, so
+    that even places give even points.
+    """
+    radius = np.sqrt((i + places[:, 1]) / count)
+    angle = 2 * np.pi * places[:, 0] + i * GOLDEN_ANGLE
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+
+def _arriving(light: Spotlight, tracer: Tracer, at: Hits | Surfaces, points: Array | None) -> Array:
+    """Irradiance over emission on surfaces (n), float64 (n,); from `points` of the unit disc, (n, 2), if any."""
+    source = np.broadcast_to(np.asarray(light.position, float), at.position.shape)
+    if points is not None:
+        right, up = frames(light.axis)
+        source = source + light.radius * (points[:, :1] * right + points[:, 1:] * up)
+    to = source - at.position
+    square = np.maximum(_dot(to, to), np.finfo(float).tiny)
+    to /= np.sqrt(square)[:, None]
+    facing = _dot(to, at.normal) > 0
+    strength = np.maximum(_dot(to, at.shading_normal), 0) * facing
+    strength *= np.maximum(-to @ light.axis, 0) * light.cone(-to) / square
+    lit = np.flatnonzero(strength)
+    starts = tracer.lift(at.position[lit], at.normal[lit])
+    strength[lit[tracer.occluded(starts, source[lit])]] = 0
+    return strength
+
+
+def _dot(a: Array, b: Array) -> Array:
+    products: Array = np.einsum("ij,ij->i", a, b)
+    return products

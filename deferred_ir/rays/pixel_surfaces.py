@@ -1,0 +1,61 @@
+"""Surfaces behind a frame's pixels, from a G-buffer that was read back: what the shaders see, on the CPU."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.scene.camera import Camera
+
+
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """What n pixels show; the background is left out.
+
+    pixel: int (n,), row * width + column, bottom row first, ascending.
+    position, normal (geometric), shading_normal: float32 (n, 3), world space, both normals towards the viewer.
+    """
+
+    pixel: Ints
+    position: Array
+    normal: Array
+    shading_normal: Array
+
+    def rows(self, chosen: Ints | slice) -> Surfaces:
+        """Some of them: indices (m,) or a slice."""
+        normal = self.normal[chosen]
+        smooth = normal if self.shading_normal is self.normal else self.shading_normal[chosen]
+        return Surfaces(self.pixel[chosen], self.position[chosen], normal, smooth)
+
+
+def from_gbuffer(camera: Camera, near: float, depth: Array, normals: Array, *, smooth: bool = True) -> Surfaces:
+    """Decode reversed `depth` (H, W) and octahedral `normals` (H, W, 4), float32, bottom row first.
+
+    near: the camera's near plane, in world units. smooth: the scene has shading normals; else both normals are one
+    array. The same as `unproject` and `from_octahedral` in shaders/lib.
+    """
+    height, width = depth.shape
+    pixel = np.flatnonzero(depth > 0)
+    y, x = np.divmod(pixel.astype(np.int32), np.int32(width))
+    a, b, c = camera.ray_axes((width, height))
+    across = np.multiply.outer((np.arange(width) + 0.5) / width * 2 - 1, a).astype(np.float32)
+    up = (np.multiply.outer((np.arange(height) + 0.5) / height * 2 - 1, b) + c).astype(np.float32)
+    position = across[x] + up[y]
+    position *= (np.float32(near) / depth.reshape(-1)[pixel])[:, None]
+    position += np.asarray(camera.position, np.float32)
+    code = normals.reshape(-1, 4)[pixel]
+    normal = _from_octahedral(code[:, 2:])
+    return Surfaces(pixel, position, normal, _from_octahedral(code[:, :2]) if smooth else normal)
+
+
+def _from_octahedral(code: Array) -> Array:
+    """Unit vectors (n, 3) of codes (n, 2) in [0, 1] (Cigolle et al. 2014), as in shaders/lib/surface/gbuffer.glsl."""
+    vectors = np.empty((len(code), 3), np.float32)
+    plane, z = vectors[:, :2], vectors[:, 2]
+    np.subtract(code * np.float32(2), np.float32(1), out=plane)
+    np.subtract(1, np.abs(plane).sum(axis=1), out=z)
+    plane -= np.copysign(np.maximum(-z, 0)[:, None], plane)
+    vectors /= np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    return vectors

@@ -1,0 +1,157 @@
+"""Ray queries with Embree: closest hits with everything a light path needs, and occlusion between points.
+
+embreex runs in one thread and releases the GIL, so rays go out in chunks over a thread pool. It is an optional
+dependency (no Linux arm64 wheel): without it `Tracer` raises a one-line DeviceError.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Bools, Ints
+from deferred_ir.rays.embree import INFINITE, Rays
+from deferred_ir.scene import materials
+from deferred_ir.scene.scene import Scene
+
+CHUNK = 1 << 15
+OFFSET = 1e-5
+"""Ray origins are pushed off their surface by this fraction of the scene's scale, or of their own distance from the
+origin where that is larger: float32 positions err by 1e-7 of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Closest hits of n rays; rows of rays that miss hold zeros and face -1.
+
+    face: int32 (n,). position: float64 (n, 3). albedo: float64 (n, 3).
+    normal: geometric normal, shading_normal: both unit, float64 (n, 3), turned
+        against the ray as docs/conventions.md says.
+    """
+
+    face: Ints
+    position: Array
+    normal: Array
+    shading_normal: Array
+    albedo: Array
+
+    @property
+    def hit(self) -> Bools:
+        """Which rays met a surface, bool (n,)."""
+        return self.face >= 0
+
+    def rows(self, chosen: Ints) -> Hits:
+        """The hits of the rays `chosen`, indices (m,)."""
+        return Hits(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+
+class Tracer:
+    """Embree over one scene's triangles. Build it once a scene, and let it `follow` the scene's moving models.
+
+    `seconds` is the time spent inside Embree so far.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.seconds = 0.0
+        self._rays = Rays(scene.geometry)
+        self.offset = OFFSET * scene.geometry.scale
+
+    def follow(self, scene: Scene) -> None:
+        """Go on with the same triangles where `scene` has them: its moving models may be elsewhere."""
+        if scene.geometry is not self.scene.geometry:
+            self._rays.pose(scene.geometry)
+        self.scene = scene
+
+    @cached_property
+    def _pool(self) -> ThreadPoolExecutor:
+        return ThreadPoolExecutor(os.cpu_count())
+
+    def _map(self, function: Callable[[slice], Any], count: int) -> list[Any]:
+        """`function` of each chunk of `count` rays, in order; on the pool only where there is more than one."""
+        chunks = [slice(start, start + CHUNK) for start in range(0, count, CHUNK)]
+        start = time.perf_counter()
+        results = list(self._pool.map(function, chunks)) if len(chunks) > 1 else [function(chunk) for chunk in chunks]
+        self.seconds += time.perf_counter() - start
+        return results
+
+    def closest(self, origins: Array, directions: Array) -> Hits:
+        """First surfaces that rays (n, 3), (n, 3) meet; the caller offsets origins that lie on a surface."""
+        org, dirs = origins.astype(np.float32), directions.astype(np.float32)
+        face, u, v = self._first(lambda chunk: self._rays.closest(org[chunk], dirs[chunk]), len(org))
+        u, v = u.astype(np.float64), v.astype(np.float64)
+        return self._hits(face, np.stack([1 - u - v, u, v], axis=-1), np.asarray(directions, np.float64))
+
+    def within(self, origins: Array, directions: Array, reach: float) -> tuple[Ints, Hits]:
+        """Which of the rays (n, 3), (n, 3) meet a surface within `reach` lengths of their directions, and where.
+
+        Rows of the rays (m,), ascending, and their m closest hits. As `closest`, but free of what rays that miss cost.
+        """
+        org, dirs = origins.astype(np.float32), directions.astype(np.float32)
+        ends = np.full(len(org), min(reach, INFINITE), np.float32)
+        face, u, v = self._first(lambda chunk: self._rays.closest(org[chunk], dirs[chunk], ends[chunk]), len(org))
+        rows = np.flatnonzero(face >= 0)
+        u, v = u[rows].astype(np.float64), v[rows].astype(np.float64)
+        weights = np.stack([1 - u - v, u, v], axis=-1)
+        return rows, self._hits(face[rows], weights, np.asarray(directions[rows], np.float64))
+
+    def _first(self, ask: Callable[[slice], tuple[Ints, Array, Array]], count: int) -> tuple[Ints, Array, Array]:
+        """What `ask` gives for all chunks of rays, joined: faces, u and v."""
+        parts = [(np.zeros(0, np.int32), np.zeros(0, np.float32), np.zeros(0, np.float32)), *self._map(ask, count)]
+        face, u, v = (np.concatenate(column) for column in zip(*parts, strict=True))
+        return face, u, v
+
+    def _hits(self, face: Ints, weights: Array, directions: Array) -> Hits:
+        geometry = self.scene.geometry
+        hit = face >= 0
+        corners, weights = geometry.faces[face[hit]], weights[hit]
+        position, normal, shading, albedo = (np.zeros((len(face), 3)) for _ in range(4))
+        position[hit] = blended(geometry.positions, corners, weights)
+        facing = turned(geometry.face_normals[face[hit]], -directions[hit])
+        smooth = facing.copy()
+        if geometry.normals is not None:
+            blend = blended(geometry.normals, corners, weights)
+            length = np.sqrt(np.einsum("ij,ij->i", blend, blend))
+            has = length > 1e-6
+            smooth[has] = turned(blend[has] / length[has, None], facing[has])
+        normal[hit], shading[hit] = facing, smooth
+        albedo[hit] = materials.albedo(self.scene, face[hit], weights)
+        return Hits(face, position, normal, shading, albedo)
+
+    def occluded(self, origins: Array, targets: Array, *, lifted: bool = False) -> Bools:
+        """Whether anything lies strictly between points (n, 3) and (n, 3), bool (n,).
+
+        The far end stops short by a ten-thousandth of the way, so targets may lie on surfaces; an origin on a surface
+        needs its offset (see `lift`). lifted: targets have theirs as well, and the whole way counts, since a wall may
+        stand close to them.
+        """
+        org, way = origins.astype(np.float32), (targets - origins).astype(np.float32)
+        reach = np.full(len(org), 1 if lifted else 1 - 1e-4, np.float32)
+        parts = self._map(lambda chunk: self._rays.occluded(org[chunk], way[chunk], reach[chunk]), len(org))
+        return np.concatenate([np.zeros(0, bool), *parts])
+
+    def lift(self, positions: Array, normals: Array) -> Array:
+        """Points pushed off their surfaces along `normals`, so that rays from them do not meet it again."""
+        far = OFFSET * np.abs(positions).max(axis=-1, keepdims=True)
+        lifted: Array = positions + normals * np.maximum(far, self.offset)
+        return lifted
+
+
+def blended(values: Array, corners: Ints, weights: Array) -> Array:
+    """The rows of `values` (v, 3) at `corners` (n, 3), weighted by `weights` (n, 3) and added up, float64 (n, 3)."""
+    a, b, c = (values[corners[:, i]] * weights[:, i, None] for i in range(3))
+    total: Array = a + b + c
+    return total
+
+
+def turned(normals: Array, towards: Array) -> Array:
+    """`normals` (n, 3), flipped where they point away from `towards` (n, 3)."""
+    away = np.einsum("ij,ij->i", normals, towards) < 0
+    return np.where(away[:, None], -normals, normals)

@@ -1,0 +1,103 @@
+"""What a run left out, why, and what that saved where it is measured: milliseconds of a frame, bytes on the device."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from deferred_ir.base.errors import DeviceError, GraphError
+from deferred_ir.engine.record import Record
+from deferred_ir.graph.graph import Plan, Texture
+from deferred_ir.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from deferred_ir.engine.renderer import Renderer
+
+TURNS = 3
+"""Times that passes which were left out are run, to measure them."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """ms: of a frame's GPU time, median; bytes: on the device; None where it is not measured."""
+
+    what: str
+    why: str
+    ms: float | None = None
+    bytes: int | None = None
+
+
+def of_scene(scene: Scene) -> list[LeftOut]:
+    """Attributes and the code that reads them, which this scene does not need."""
+    g = scene.geometry
+    vertices = len(g.positions)
+    textured = {material.texture is not None for material in scene.materials}
+    found = [
+        (g.normals is None, LeftOut("vertex normals", "the scene has none", bytes=12 * vertices)),
+        (g.colors is None, LeftOut("vertex colours", "the scene has none", bytes=12 * vertices)),
+        (not scene.textures, LeftOut("textures", "the scene has none", bytes=8 * vertices)),
+        (textured == {True}, LeftOut("faces without a texture", "the scene has none")),
+        (len(scene.materials) == 1, LeftOut("a material for each face", "the scene has one")),
+        (scene.spotlight.radius == 0, LeftOut("soft shadows", "the spotlight's radius is 0")),
+    ]
+    return [entry for absent, entry in found if absent]
+
+
+def of_frames(renderer: Renderer, plan: Plan, record: Record) -> list[LeftOut]:
+    """What the frames that `record` tells of did without, as the device has it after the last of them."""
+    executor, frames, last = renderer.executor, len(record.kept), record.counters[-1]
+    found = [
+        LeftOut(name, f"in {n} of {frames} frames nothing that it is made of changed", ms)
+        for name, n, ms in record.reused()
+    ]
+    if dropped := last.get("lights_dropped", 0):
+        found.append(LeftOut(f"maps of {dropped} lights", "they light nothing that is seen"))
+    if skipped := last.get("lights_skipped", 0):
+        why = "the tile of the screen lies behind the light, or outside its cone"
+        found.append(LeftOut(f"{skipped} pairs of tile and light", why))
+    if renderer.embree_seconds == 0:
+        found.append(LeftOut("Embree's scene", "no ray was traced"))
+    for step in plan.steps:
+        for port, output in step.outputs.items():
+            described = output.description
+            if not isinstance(described, Texture) or not described.grows:
+                continue
+            made = executor.resource((step.name, port))
+            if made.layers < described.layers:
+                why = f"{made.layers} of {described.layers} layers are enough for the lights that live"
+                spared = made.nbytes // made.layers * (described.layers - made.layers)
+                found.append(LeftOut(f"{step.name}.{port}", why, bytes=spared))
+    nbytes = executor.nbytes()
+    for source, home in executor.tenants.items():
+        why = f"it has the texture of {'.'.join(home)}, which nothing reads any more"
+        found.append(LeftOut(".".join(source), why, bytes=nbytes[".".join(home)]))
+    return found
+
+
+def of_passes(renderer: Renderer, scene: Scene, plan: Plan, *, vpls: int | None = None, seed: int = 0) -> list[LeftOut]:
+    """Passes and targets that `plan` does without; those that another scene or output would need are run and measured.
+
+    Call it when all frames are drawn and read: it draws into what they have left. Where they cannot run here, since
+    their maps would not fit for one, they stay without figures.
+    """
+    ms, nbytes = dict[str, float](), dict[str, int]()
+    if plan.left_out:
+        with suppress(DeviceError, GraphError):
+            ms = _timed(renderer, scene, plan, vpls=vpls, seed=seed)
+            nbytes = renderer.executor.nbytes()
+    return [LeftOut(name, why, ms.get(name), nbytes.get(name)) for name, why in plan.left_out.items()]
+
+
+def _timed(renderer: Renderer, scene: Scene, plan: Plan, *, vpls: int | None, seed: int) -> dict[str, float]:
+    """GPU time of each pass that runs with `keep_all` and not in `plan`, ms."""
+    full = renderer.plan(scene, vpls, keep_all=True)
+    extra = {step.name for step in full.steps} - {step.name for step in plan.steps}
+    record, reuse, renderer.reuse = Record(), renderer.reuse, False
+    try:
+        for turn in range(1 + TURNS):
+            renderer.draw(scene, full, seed=seed, steps=extra, record=record if turn else None)
+        renderer.finish(record)
+    finally:
+        renderer.reuse = reuse
+    return {str(entry["name"]): float(entry["gpu_ms"]) for entry in record.passes()}

@@ -1,0 +1,61 @@
+"""How much indirect light a VPL image loses by design: to the clamp on 1/d^2 and to the cone of vpl.fov.
+
+Estimated, not guessed: cosine-distributed rays from what the camera sees find the light that one bounce brings; a share
+of it arrives from nearer than the clamp distance c, which VPLs give only d^2/c^2 of, and a share leaves its surface
+outside the cone (Kollig and Keller 2004 call the first the bounded part's residual).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from deferred_ir.rays.direct import lit_by
+from deferred_ir.rays.tracer import Tracer
+from deferred_ir.scene.lights.spot import one_minus_cos
+from deferred_ir.scene.scene import Scene
+from deferred_ir.vpls.cast import LUMINANCE, lift_to_hemisphere
+
+GRID = 128
+RAYS = 8
+
+
+def estimate(
+    scene: Scene, tracer: Tracer, *, clamp: float, fov: float, given_back: bool = False, seed: int = 0
+) -> dict[str, float] | None:
+    """Relative indirect light lost to `clamp` (fraction of the diagonal) and to the cone `fov` (degrees), both <= 0.
+
+    Of the first bounce, over the image, by luminance. given_back: what is lost within the clamp distance is added by
+    short rays (deferred_ir/vpls/clamp_residual.py). None where the camera sees no indirect light.
+    """
+    rng = np.random.default_rng(seed)
+    directions = scene.camera.rays((GRID, GRID)).reshape(-1, 3)
+    seen = tracer.closest(np.broadcast_to(np.asarray(scene.camera.position, float), directions.shape), directions)
+    seen_at = np.repeat(np.flatnonzero(seen.hit), RAYS)
+    origins = tracer.lift(seen.position[seen_at], seen.normal[seen_at])
+    # A ray each in RAYS slices of the angle, the radius at random: the disc's area, evenly.
+    radius, angle = (
+        np.sqrt(rng.random(len(seen_at))),
+        (np.arange(len(seen_at)) % RAYS + rng.random(len(seen_at))) / RAYS,
+    )
+    points = np.stack([radius * np.cos(2 * np.pi * angle), radius * np.sin(2 * np.pi * angle)], axis=1)
+    away = lift_to_hemisphere(points, seen.shading_normal[seen_at])
+    above = np.flatnonzero((away * seen.normal[seen_at]).sum(axis=1) > 0)  # into its own face: nothing arrives
+    found, hits = tracer.within(origins[above], away[above], np.inf)
+    rays = above[found]
+    light = scene.spotlight
+    lit = np.multiply.outer(lit_by(light, tracer, hits, rng), np.asarray(light.emission, float))
+    weight = (lit * hits.albedo * seen.albedo[seen_at[rays]]) @ LUMINANCE
+    total = weight.sum()
+    if total <= 0:
+        return None
+    distance = np.linalg.norm(hits.position - origins[rays], axis=1)
+    c = clamp * scene.geometry.diagonal
+    kept = np.minimum(1, (distance / c) ** 2) if c > 0 else np.ones(len(distance))
+    outside = -(away[rays] * hits.normal).sum(axis=1) < 1 - one_minus_cos(fov)
+    if given_back:
+        kept[:] = 1
+        outside &= distance > c
+    return {
+        "clamp": round(float((weight * (kept - 1)).sum() / total), 5),
+        "wide_light": round(float(-weight[outside].sum() / total), 5),
+    }

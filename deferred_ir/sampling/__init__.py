@@ -1,0 +1,1 @@
+"""Sample patterns and orders of points; nothing here knows what is sampled."""

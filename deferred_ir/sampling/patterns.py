@@ -1,0 +1,104 @@
+"""Sample patterns in the unit square, the map from there to a disc, and systematic resampling.
+
+Sources: Shirley and Chiu 1997 (concentric map); Owen 1998, Joe and Kuo 2008 through scipy.stats.qmc (scrambled Sobol
+and Halton).
+"""
+
+from __future__ import annotations
+
+import logging
+from functools import lru_cache
+from typing import Literal, get_args
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Ints
+
+log = logging.getLogger("deferred_ir")
+Pattern = Literal["random", "stratified", "halton", "sobol"]
+PATTERNS: tuple[str, ...] = get_args(Pattern)
+
+
+@lru_cache(maxsize=8)
+def unit_square(pattern: Pattern, count: int, seed: int) -> Array:
+    """`count` points in [0, 1)^2, float64 (count, 2), the same for the same arguments. Read-only: it is cached."""
+    points = _points(pattern, count, seed)
+    points.flags.writeable = False
+    return points
+
+
+@lru_cache(maxsize=8)
+def unit_disc(pattern: Pattern, count: int, seed: int) -> Array:
+    """`unit_square` mapped to the unit disc. Read-only: it is cached, for frames that repeat a seed."""
+    points = disc(unit_square(pattern, count, seed))
+    points.flags.writeable = False
+    return points
+
+
+def frame_seed(seed: int, frame: int) -> int:
+    """The seed of frame `frame` of those that are averaged under `seed`: `seed` itself, then numbers of 31 bits.
+
+    They are mixed from both, so that frames under one seed are none of those under another.
+    """
+    return seed if frame == 0 else int(np.random.SeedSequence([seed, frame]).generate_state(1)[0] >> 1)
+
+
+def warn_unbalanced(pattern: Pattern, count: int) -> None:
+    """Say that `count` points of a Sobol set are not balanced, unless it is a power of two."""
+    if pattern == "sobol" and count & (count - 1):
+        whole = 1 << count.bit_length()
+        log.warning(
+            "sobol: %d points are not balanced, only powers of two are; take %d or %d", count, whole // 2, whole
+        )
+
+
+def _points(pattern: Pattern, count: int, seed: int) -> Array:
+    rng = np.random.default_rng(seed)
+    if count == 0 or pattern == "random":
+        return rng.random((count, 2))
+    if pattern == "stratified":
+        return _stratified(count, rng)
+    from scipy.stats import qmc
+
+    if pattern == "halton":
+        return np.asarray(qmc.Halton(2, rng=rng).random(count))
+    # All 2^m points: SciPy would warn about other counts, and warn_unbalanced has done so once.
+    points: Array = qmc.Sobol(2, rng=rng).random_base2(int(np.ceil(np.log2(count))))[:count]
+    return points
+
+
+def _stratified(count: int, rng: np.random.Generator) -> Array:
+    """Jittered cells: rows of nearly equal area and count, so that any `count` works, not only squares."""
+    rows = max(1, round(np.sqrt(count)))
+    per_row = np.diff(np.arange(rows + 1) * count // rows)
+    row = np.repeat(np.arange(rows), per_row)
+    column = np.arange(count) - np.repeat(np.cumsum(per_row) - per_row, per_row)
+    # A row is as high as its share of the points, so all cells have the same area.
+    heights = per_row / count
+    tops = np.cumsum(heights) - heights
+    u = (column + rng.random(count)) / per_row[row]
+    v = tops[row] + heights[row] * rng.random(count)
+    points: Array = np.minimum(np.stack([u, v], axis=1), np.nextafter(1, 0))
+    return points
+
+
+def disc(square: Array) -> Array:
+    """Points of the unit square (n, 2) to the unit disc, preserving area and strata (Shirley and Chiu 1997)."""
+    a, b = 2 * square[:, 0] - 1, 2 * square[:, 1] - 1
+    wide = np.abs(a) > np.abs(b)
+    radius = np.where(wide, a, b)
+    # The smaller over the larger coordinate; both are 0 only at the centre, where the angle does not matter.
+    ratio = np.where(wide, b, a) / np.where(radius == 0, 1, radius)
+    angle = np.where(wide, np.pi / 4 * ratio, np.pi / 2 - np.pi / 4 * ratio)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+
+
+def systematic(weights: Array, count: int, offset: float) -> Ints:
+    """`count` indices, each drawn count * weight / sum(weights) times, rounded up or down (systematic resampling).
+
+    Indices come in order. `offset`, uniform in [0, 1), makes it unbiased. Some weight must be above 0.
+    """
+    ends = np.cumsum(weights)
+    ticks = (np.arange(count) + offset) / count * ends[-1]
+    drawn: Ints = np.minimum(np.searchsorted(ends, ticks, side="right"), len(weights) - 1)
+    return drawn

@@ -1,0 +1,76 @@
+"""The pinhole camera: where it stands, and the numbers that shaders and ray tracers need of it.
+
+Conventions (docs/conventions.md): right-handed world, the camera looks along its -z, +x is right, +y is up.
+Pixel (0, 0) is the top left one of an image; its centre lies half a pixel inside.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from pyglm import glm
+
+from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.scene.motion import CameraMotion
+
+
+def view_fault(position: Vec3, look_at: Vec3, up: Vec3 | None = None) -> tuple[str, str] | None:
+    """The key at fault and why, where a view has no direction or `up` lies along it; None for a good view."""
+    view = np.subtract(look_at, position)
+    length = math.hypot(*view)
+    if length <= 1e-9 * max(map(abs, (*position, *look_at))):
+        return "look_at", "is the same point as the position; move one of them"
+    if up is None:
+        return None
+    up_length = math.hypot(*up)
+    if up_length == 0:
+        return "up", "must not be zero; [0, 1, 0] is the usual one"
+    if np.linalg.norm(np.cross(view / length, np.divide(up, up_length))) < 1e-6:
+        return "up", "up lies along the direction of view; turn it to the side"
+    return None
+
+
+@dataclass(frozen=True)
+class Camera:
+    """position, look_at, up: world space; fov: vertical opening angle in degrees."""
+
+    position: Vec3
+    look_at: Vec3
+    up: Vec3 = (0.0, 1.0, 0.0)
+    fov: float = 60.0
+    motion: CameraMotion | None = None
+
+    @cached_property
+    def axes(self) -> Array:
+        """Rows: right, up and forward, orthonormal, float64 (3, 3)."""
+        # Three numbers each: given one tuple, PyGLM reads it in single precision.
+        view = glm.lookAt(glm.dvec3(*self.position), glm.dvec3(*self.look_at), glm.dvec3(*self.up))
+        rows = np.array(view, dtype=np.float64)[:3, :3]  # GLM's rows of the view matrix: right, up, backward
+        axes: Array = rows * np.array([[1.0], [1.0], [-1.0]])
+        return axes
+
+    def ray_axes(self, size: tuple[int, int]) -> Array:
+        """Rows a, b, c, float64 (3, 3): the point at view depth 1 behind NDC (x, y) is position + a*x + b*y + c.
+
+        `size` is (width, height) in pixels.
+        """
+        width, height = size
+        tangent = np.tan(np.radians(self.fov) / 2)
+        axes: Array = self.axes * np.array([[tangent * width / height], [tangent], [1.0]])
+        return axes
+
+    def rays(self, size: tuple[int, int]) -> Array:
+        """Directions through all pixel centres, not normalised (view depth 1), float64 (H, W, 3), top row first."""
+        width, height = size
+        a, b, c = self.ray_axes(size)
+        x = (np.arange(width) + 0.5) / width * 2 - 1
+        y = 1 - (np.arange(height) + 0.5) / height * 2
+        directions: Array = x[None, :, None] * a + y[:, None, None] * b + c
+        return directions
+
+    def at(self, time: float) -> Camera:
+        """The camera at `time` seconds of its motion."""
+        return self.motion.camera(self, time) if self.motion else self

@@ -1,0 +1,1 @@
+"""Lights, one kind a file."""

@@ -1,0 +1,140 @@
+"""What a scene is: triangles, materials, a camera and one spotlight. `load` makes one from files.
+
+All arrays are world space. Nothing here touches OpenGL.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import isfinite
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from deferred_ir.base.arrays import Vec3
+from deferred_ir.base.errors import SceneError, SettingError
+from deferred_ir.graph.graph import Facts
+from deferred_ir.scene.camera import Camera, view_fault
+from deferred_ir.scene.geometry import Geometry, Model
+from deferred_ir.scene.lights.spot import Spotlight
+
+View = TypeVar("View", Camera, Spotlight)
+
+
+def moved(view: View, by: Vec3) -> View:
+    """A camera or a spotlight, at rest, in coordinates that differ by `by`."""
+    (x, y, z), (u, v, w), (a, b, c) = view.position, view.look_at, by
+    return replace(view, position=(x + a, y + b, z + c), look_at=(u + a, v + b, w + c), motion=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """An image texture. pixels: uint8 (H, W, 3), sRGB, top row first; v = 1 is the top edge; repeated in u and v."""
+
+    name: str
+    pixels: Any
+
+
+@dataclass(frozen=True)
+class Material:
+    """Lambertian: reflectance = albedo (linear RGB) times the texture (index into Scene.textures), if any."""
+
+    name: str
+    albedo: tuple[float, float, float]
+    texture: int | None = None
+
+
+@dataclass(frozen=True)
+class RenderDefaults:
+    """The scene file's [render] table: what the command line takes where it says nothing."""
+
+    graph: str | None = None
+    size: tuple[int, int] | None = None
+    vpls: int | None = None
+    seed: int | None = None
+    set: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A loaded scene. `chosen` says what was picked for the user, `notes` what of the files is not honoured."""
+
+    name: str
+    path: Path
+    geometry: Geometry
+    materials: tuple[Material, ...]
+    textures: tuple[Texture, ...]
+    models: tuple[Model, ...]
+    camera: Camera
+    spotlight: Spotlight
+    render: RenderDefaults = RenderDefaults()
+    chosen: Mapping[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def hash(self) -> str:
+        """First 16 hex digits of SHA-256 over everything that a picture depends on."""
+        import hashlib
+
+        digest = hashlib.sha256()
+        g = self.geometry
+        for array in (g.positions, g.faces, g.face_materials, g.normals, g.uvs, g.colors):
+            digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
+        for texture in self.textures:
+            digest.update(repr(texture.pixels.shape).encode() + np.ascontiguousarray(texture.pixels).tobytes())
+        motions = tuple(model.motion for model in self.models)
+        digest.update(repr((self.materials, self.camera, self.spotlight, motions)).encode())
+        return digest.hexdigest()[:16]
+
+    @property
+    def centred(self) -> Scene:
+        """The scene as it stands, near the origin: what the GPU and Embree, which hold 32 bits, are given.
+
+        Itself where they can hold it as it is (see Geometry.centred). Camera and light rest where they are.
+        """
+        if self.geometry.centred is self.geometry:
+            return self
+        x, y, z = self.geometry.centre
+        by = (-x, -y, -z)
+        return replace(
+            self,
+            geometry=self.geometry.centred,
+            camera=moved(self.camera, by),
+            spotlight=moved(self.spotlight, by),
+        )
+
+    @property
+    def facts(self) -> Facts:
+        """What planning a frame may know of the scene."""
+        return Facts(emits=any(self.spotlight.emission), triangles=len(self.geometry.faces))
+
+    @property
+    def moves(self) -> bool:
+        """Whether anything in it has a motion."""
+        return bool(self.camera.motion or self.spotlight.motion or self.geometry.moves)
+
+    def at(self, time: float) -> Scene:
+        """The scene at `time` seconds, at rest there; itself where nothing moves.
+
+        At times between which no model moves geometry is the same object. SceneError if camera or spotlight meet what
+        they look at, SettingError if the time is not finite.
+        """
+        if not isfinite(time):
+            raise SettingError(f"time {time}: must be finite, in seconds")
+        geometry = self.geometry.at(time)
+        if geometry is self.geometry and self.camera.motion is None and self.spotlight.motion is None:
+            return self
+        camera, light = self.camera.at(time), self.spotlight.at(time)
+        views = {
+            "camera": view_fault(camera.position, camera.look_at, camera.up),
+            "spotlight": view_fault(light.position, light.look_at),
+        }
+        for name, fault in views.items():
+            if fault:
+                raise SceneError(f"{self.path}: {name}.motion: at {time:g} s {fault[0]} {fault[1]}")
+        return replace(
+            self, geometry=geometry, camera=replace(camera, motion=None), spotlight=replace(light, motion=None)
+        )

@@ -1,0 +1,1 @@
+"""What the passes that draw or read shadow maps share."""

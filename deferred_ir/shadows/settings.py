@@ -1,0 +1,153 @@
+"""What all passes that draw planar shadow maps share: their parameters and what readers must know of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Bools
+from deferred_ir.base.errors import GraphError
+from deferred_ir.graph.params import param
+from deferred_ir.scene.lights.spot import one_minus_cos
+
+WIDEST_PLANAR = 140.0
+"""A spotlight wider than this, in degrees, gets a paraboloid map: the planar one has few texels for its middle."""
+WIDE = one_minus_cos(WIDEST_PLANAR)
+
+MOST_LAYERS = 2048
+"""Of an array texture: what every driver of OpenGL 4.3 takes."""
+
+LEAST_REACH = 2.0
+"""In paraboloid maps triangles nearer than this, in lengths of their edges, are split, however small the map is."""
+
+
+@dataclass(frozen=True)
+class MapParams:
+    """Parameters of shadow maps."""
+
+    spot_size: int = param(2048, lo=16, hi=16384, doc="Width and height of the spotlight's map, texels.")
+    vpl_size: int = param(256, lo=16, hi=4096, doc="Width and height of a VPL's map, texels.")
+    spot_offset: float = param(
+        0.1, lo=0.0, hi=16.0, doc="How far a point is lifted off its face before the spotlight's map is asked, texels."
+    )
+    vpl_offset: float = param(0.25, lo=0.0, hi=16.0, doc="The same before a VPL's map is asked, texels.")
+    spot_kernel: float = param(
+        1.0, lo=1.0, hi=64.0, doc="Filter of the spotlight's map: width in texels. 1: the hardware's 2x2 alone."
+    )
+    vpl_kernel: float = param(1.0, lo=1.0, hi=64.0, doc="The same of a VPL's map.")
+    spot_taps: int = param(16, lo=1, hi=256, doc="Comparisons that a wider filter spreads over the spotlight's map.")
+    vpl_taps: int = param(8, lo=1, hi=256, doc="The same over a VPL's map.")
+    soft: Literal["pcss", "off"] = param(
+        "pcss", doc="Shadows of a spotlight with a radius: percentage-closer soft shadows, or hard ones."
+    )
+    search_taps: int = param(16, lo=1, hi=256, doc="Soft shadows: depths read in each of two searches for blockers.")
+    soft_taps: int = param(32, lo=1, hi=256, doc="Soft shadows: comparisons spread over the penumbra.")
+    projection: Literal["perspective", "paraboloid"] = param(
+        "perspective", doc="Of the VPLs' maps. The spotlight's is a paraboloid where it is wider than 140 degrees."
+    )
+    bend: float = param(
+        2.0, lo=0.1, hi=16.0, doc="Paraboloid maps: edges that may be off by more texels than this are split."
+    )
+    tessellation: Literal["adaptive", "pre"] = param(
+        "adaptive",
+        doc="Paraboloid maps of VPLs: split in each map what bends there, or draw a mesh without long edges straight.",
+    )
+    edge: float = param(0.05, lo=1e-4, hi=1.0, doc="Longest edge of that mesh, as a fraction of the scene's diagonal.")
+    vpl_deviation: float = param(
+        0.0,
+        lo=0.0,
+        hi=16.0,
+        doc="VPLs' maps draw a scene that is off by no more than this, texels in the middle of the map. 0: the scene.",
+    )
+    cull: Literal["none", "front"] = param(
+        "none", doc="front: draw back faces only, which moves the bias to the dark side; for closed meshes."
+    )
+    budget: int = param(1280, lo=1, hi=65536, doc="Most memory that the maps may take, MiB.")
+
+    def check_budget(self, vpls: int, nbytes: int, fits: int) -> None:
+        """Raise GraphError if maps for `vpls` VPLs, `nbytes` in all, go beyond the budget; `fits` VPLs would not.
+
+        And if parameters contradict each other.
+        """
+        if self.vpl_deviation > 0 and self.projection == "paraboloid" and self.tessellation == "pre":
+            raise GraphError(
+                "shadow_maps.vpl_deviation and shadow_maps.tessellation = 'pre' each draw a mesh of their own; "
+                "set vpl_deviation = 0 or tessellation = 'adaptive'"
+            )
+        if nbytes > self.budget * 2**20:
+            if 4 * self.spot_size**2 > self.budget * 2**20:
+                raise GraphError(
+                    f"the spotlight's map of {self.spot_size}x{self.spot_size} alone needs "
+                    f"{4 * self.spot_size**2 // 2**20} MiB, and shadow_maps.budget is {self.budget}; use a smaller "
+                    "shadow_maps.spot_size or a larger budget"
+                )
+            raise GraphError(
+                f"maps for {vpls} VPLs of {self.vpl_size}x{self.vpl_size} need {nbytes // 2**20} MiB, and "
+                f"shadow_maps.budget is {self.budget}; {max(fits, 0)} VPLs fit, all bounces together; "
+                "use fewer, a smaller shadow_maps.vpl_size or a larger budget"
+            )
+
+    def check_layers(self, vpls: int, layers: int, tiles: int) -> None:
+        """Raise GraphError if an atlas has too many layers; VPLs have `tiles` on each but the first."""
+        if layers > MOST_LAYERS:
+            raise GraphError(
+                f"maps for {vpls} VPLs of {self.vpl_size}x{self.vpl_size} need {layers} layers, and there are "
+                f"{MOST_LAYERS}; {(MOST_LAYERS - 1) * tiles} VPLs fit, all bounces together; "
+                "use fewer, a smaller shadow_maps.vpl_size or a larger shadow_maps.spot_size"
+            )
+
+    def defines(self) -> dict[str, int | float]:
+        """For the shaders of writer and readers."""
+        return {
+            "VPL_PARABOLOID": int(self.projection == "paraboloid"),
+            "WIDE_SPOT": WIDE,
+            "SPOT_SIZE": self.spot_size,
+            "VPL_SIZE": self.vpl_size,
+            "SPOT_OFFSET": float(self.spot_offset),
+            "VPL_OFFSET": float(self.vpl_offset),
+            "SPOT_KERNEL": float(self.spot_kernel),
+            "VPL_KERNEL": float(self.vpl_kernel),
+            "SPOT_TAPS": self.spot_taps,
+            "VPL_TAPS": self.vpl_taps,
+            "SOFT": int(self.soft == "pcss"),
+            "SEARCH_TAPS": self.search_taps,
+            "SOFT_TAPS": self.soft_taps,
+        }
+
+    def paraboloid(self, records: np.ndarray) -> Bools:
+        """Which lights' maps are paraboloids, bool (n,); records: LIGHT (n,)."""
+        chosen: Bools = (records["tile"] >= 0) & (self.projection == "paraboloid")
+        chosen |= (records["tile"] < 0) & (records["one_minus_cos"] > WIDE)
+        return chosen
+
+    def tolerance(self, records: np.ndarray) -> Array:
+        """`vpl_deviation` in lengths of the way from each VPL, LIGHT records (n,): (n,).
+
+        A texel is widest in the middle of a map.
+        """
+        widest = 4 * records["curve"] if self.projection == "paraboloid" else 2
+        tolerance: Array = self.vpl_deviation * widest * records["tan_half"] / self.vpl_size
+        return tolerance
+
+    def reach(self, records: np.ndarray) -> Array:
+        """How many of its lengths an edge must be away from a light to bend by less than `bend` texels, (n,).
+
+        An edge that subtends an angle a from the light bends by a^2 / 8 of the hemisphere's radius at most. In small
+        maps that is little, but a triangle has to be smaller than the hemisphere, too, to be drawn as it is.
+        """
+        size = np.where(records["tile"] < 0, self.spot_size, self.vpl_size)
+        reach = np.sqrt(size / (16 * records["curve"] * records["tan_half"] * self.bend))
+        least: Array = np.maximum(reach, LEAST_REACH)
+        return least
+
+    def prepare(self, gpu: Any) -> None:
+        """OpenGL state for drawing maps in reversed depth."""
+        ctx = gpu.ctx
+        ctx.enable(ctx.DEPTH_TEST)
+        ctx.depth_func = ">"
+        if self.cull == "front":
+            # A map's axes are right, up and into the view, a left-handed frame: OpenGL sees front faces as back faces.
+            ctx.enable(ctx.CULL_FACE)
+            ctx.cull_face = "back"

@@ -1,0 +1,1 @@
+"""Ray-traced truth, and how far an image is from it."""

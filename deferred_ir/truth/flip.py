@@ -1,0 +1,106 @@
+"""HDR-FLIP, the difference that a viewer sees, by the optional package flip-evaluator.
+
+The package is called with care: it ends the whole process where it finds no exposures of its own (a reference that is
+black, or nearly), ends Python on arguments that it dislikes, returns 0 for a single exposure and hides what is not
+finite. So exposures are always given, and images arrive scaled to a range that its 32-bit floats hold.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array
+from deferred_ir.base.errors import SettingError
+
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Of linear sRGB primaries."""
+PIXELS_PER_DEGREE = 3840 * math.pi / 180
+"""FLIP's own choice: a 0.7 m wide screen of 3840 pixels, seen from 0.7 m."""
+ACES = ((0.9036, 0.018, 0.0), (0.8748, 0.354, 0.14))
+"""The tone curve that FLIP exposes with, numerator and denominator by falling powers."""
+BRIGHT = 0.85
+"""The brightest pixel at the start exposure, and the median one at the stop exposure, come out of ACES like this."""
+STOPS = 60
+"""Far beyond white: brighter pixels are cut off here, so that no exposure makes them infinite."""
+WIDEST = 40
+"""Stops between the exposures: more than any display shows, and 20 below the cut, so that white stays white."""
+
+
+@dataclass(frozen=True)
+class FlipParameters:
+    """What a FLIP value depends on besides the images: exposures in stops, how many of them, and the viewer."""
+
+    start_exposure: float
+    stop_exposure: float
+    exposures: int
+    pixels_per_degree: float = PIXELS_PER_DEGREE
+    tonemapper: str = "aces"
+
+    def __post_init__(self) -> None:
+        finite = math.isfinite(self.start_exposure) and math.isfinite(self.stop_exposure)
+        if not finite or not 0 <= self.stop_exposure - self.start_exposure <= WIDEST or self.exposures < 2:
+            raise SettingError(f"FLIP: {self}: wants 0 to {WIDEST} stops from start to stop, and 2 exposures at least")
+
+    @classmethod
+    def of(cls, reference: Array) -> FlipParameters:
+        """From the reference (H, W, 3) alone, by the rule of HDR-FLIP; use them for all images that are held to it.
+
+        Only pixels above 0 make up the median: with a black background for median there would be no last exposure.
+        Of an even number it is the upper one, as flip-evaluator has it.
+        """
+        luminance = np.asarray(reference, np.float64) @ LUMINANCE
+        lit = np.sort(luminance[luminance > 0])
+        if lit.size == 0:
+            raise SettingError("FLIP: the reference is black, there is no exposure that shows it")
+        numerator, denominator = np.array(ACES)
+        white = np.roots(numerator - BRIGHT * denominator).real.max()
+        start, stop = (float(math.log2(white / value)) for value in (lit[-1], lit[lit.size // 2]))
+        stop = min(stop, start + WIDEST)
+        return cls(start, stop, max(2, math.ceil(stop - start)))
+
+
+def obstacle(image: Array, reference: Array, names: tuple[str, str]) -> str | None:
+    """Why FLIP cannot be had of these two, or None if it can. `names` are what the text calls them."""
+    for array, name in zip((image, reference), names, strict=True):
+        below = int((array < 0).any(-1).sum())
+        if below:
+            return f"FLIP takes no radiance below 0, which {below} pixels of {name} have"
+    try:
+        import flip_evaluator
+    except ImportError as error:
+        return f"{' '.join(str(error).split())}; pip install 'deferred-ir[report]'"
+    del flip_evaluator
+    return None
+
+
+def mean_flip(image: Array, reference: Array, parameters: FlipParameters) -> float:
+    """The mean of HDR-FLIP's map over the whole picture, background included: 0 is alike, 1 is as unlike as can be.
+
+    Both images: (H, W, 3), finite, at least 0, of one size.
+    """
+    import flip_evaluator
+
+    span = parameters.stop_exposure - parameters.start_exposure
+    options: dict[str, Any] = {
+        "ppd": parameters.pixels_per_degree,
+        "startExposure": 0.0,
+        "stopExposure": span,
+        "numExposures": parameters.exposures,
+        "tonemapper": parameters.tonemapper,
+    }
+    exposed = (_exposed(array, parameters.start_exposure, 2.0 ** (STOPS - span)) for array in (reference, image))
+    try:
+        _, mean, _ = flip_evaluator.evaluate(*exposed, "HDR", applyMagma=False, parameters=options)
+    except SystemExit as end:
+        raise SettingError(f"FLIP: flip-evaluator refuses {parameters}") from end
+    return float(mean)
+
+
+def _exposed(image: Array, stops: float, white: float) -> Any:
+    """`image` at an exposure, in the layout that flip-evaluator reads."""
+    exposed = np.asarray(image, np.float64) * 2.0**stops
+    return np.ascontiguousarray(np.minimum(exposed, white), np.float32)

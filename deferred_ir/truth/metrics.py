@@ -1,0 +1,216 @@
+"""How far an image is from its reference: relMSE, RMSE, bias and FLIP, all on linear radiance.
+
+An image is a float array (H, W, 3). Every function refuses, with a SettingError that names the image, what cannot be
+measured: other shapes, sizes that differ, a reference without light, and values that are not finite, which an average
+would either spread or hide.
+
+Errors are averaged over the pixels in which the camera ray hits a surface. `hit` says which those are:
+
+* a bool array (H, W): exactly these pixels;
+* a number in (0, 1], the fraction of the pixels that are hit: enough, because the background is black in both images
+  and adds nothing to a sum. If more pixels than that are lit, all lit pixels count;
+* None: the lit pixels, which are those that are not 0 in all channels of both images. A surface that no light reaches
+  in either image then passes for background, so in a scene where such surfaces cover much the others weigh more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Bools
+from deferred_ir.base.errors import SettingError
+from deferred_ir.truth import flip
+from deferred_ir.truth.flip import FlipParameters
+
+EPSILON = 0.01
+"""relMSE adds this times mean(R)^2 to R^2, so that dark pixels do not decide alone."""
+TRIMMED = 0.001
+"""The part of the pixels, the worst ones, that trimmed relMSE leaves out."""
+LARGEST = float(np.finfo(np.float32).max)
+DARKEST = float(np.finfo(np.float32).tiny)
+NAMES = ("image", "reference")
+
+Hit = Bools | float | None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All figures of one comparison.
+
+    flip is None where FLIP could not be had; flip_note then says why. size: (width, height). pixels: how many count.
+    pixels_by: `mask`, `hit fraction` or `lit`, how that was known. trimmed_pixels: how many the trimmed relMSE leaves
+    out. Means are over the pixels that count, and RGB.
+    """
+
+    relmse: float
+    relmse_untrimmed: float
+    rmse: float
+    bias: float
+    flip: float | None
+    flip_note: str | None
+    flip_parameters: FlipParameters | None
+    size: tuple[int, int]
+    pixels: int
+    pixels_by: str
+    trimmed_pixels: int
+    image_mean: float
+    reference_mean: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {**asdict(self), "size": list(self.size)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """Two images that can be compared, in double precision. `count`: the pixels that an average is over."""
+
+    image: Array
+    reference: Array
+    mask: Bools
+    count: int
+    counted_by: str
+
+    @property
+    def mean(self) -> float:
+        """Of the reference."""
+        return float(self.reference[self.mask].sum() / (3 * self.count))
+
+    @property
+    def kept(self) -> int:
+        """How many pixels the trimmed relMSE keeps."""
+        return max(1, int(self.count * (1 - TRIMMED)))
+
+    def errors(self) -> Array:
+        """(H, W): squared relative errors, averaged over RGB; 0 outside the mask."""
+        with_epsilon = self.reference**2 + EPSILON * self.mean**2
+        errors: Array = ((self.image - self.reference) ** 2 / with_epsilon).mean(-1)
+        return np.where(self.mask, errors, 0.0)
+
+    def relmse(self) -> tuple[float, float]:
+        errors = np.sort(self.errors(), axis=None)
+        best = errors[: errors.size - (self.count - self.kept)]
+        return float(best.sum() / self.kept), float(errors.sum() / self.count)
+
+    def rmse(self) -> float:
+        squares = (self.image - self.reference)[self.mask] ** 2
+        return float(np.sqrt(squares.sum() / (3 * self.count)))
+
+    def bias(self) -> float:
+        return float((self.image - self.reference)[self.mask].sum() / self.reference[self.mask].sum())
+
+
+def compare(
+    image: Any,
+    reference: Any,
+    hit: Hit = None,
+    *,
+    names: tuple[str, str] = NAMES,
+    flip_parameters: FlipParameters | None = None,
+) -> Comparison:
+    """All figures. `names` are what messages call the two.
+
+    Give all images of a sweep the same `flip_parameters`, FlipParameters.of(reference); that is the default too.
+    """
+    pair = _pair(image, reference, hit, names)
+    trimmed, untrimmed = pair.relmse()
+    note = flip.obstacle(pair.image, pair.reference, names)
+    value = None
+    if note is None:
+        flip_parameters = flip_parameters or FlipParameters.of(pair.reference)
+        value = flip.mean_flip(pair.image, pair.reference, flip_parameters)
+    height, width, _ = pair.image.shape
+    return Comparison(
+        relmse=trimmed,
+        relmse_untrimmed=untrimmed,
+        rmse=pair.rmse(),
+        bias=pair.bias(),
+        flip=value,
+        flip_note=note,
+        flip_parameters=flip_parameters if note is None else None,
+        size=(width, height),
+        pixels=pair.count,
+        pixels_by=pair.counted_by,
+        trimmed_pixels=pair.count - pair.kept,
+        image_mean=float(pair.image[pair.mask].sum() / (3 * pair.count)),
+        reference_mean=pair.mean,
+    )
+
+
+def error_map(image: Any, reference: Any, hit: Hit = None) -> Array:
+    """(H, W): (I - R)^2 / (R^2 + 0.01 mean(R)^2), averaged over RGB. Its mean over the hit pixels is relMSE."""
+    return _pair(image, reference, hit, NAMES).errors()
+
+
+def relmse(image: Any, reference: Any, hit: Hit = None) -> tuple[float, float]:
+    """relMSE, trimmed of the worst 0.1 % of the pixels (one pixel at least is kept), and untrimmed."""
+    return _pair(image, reference, hit, NAMES).relmse()
+
+
+def masked_relmse(image: Any, reference: Any, kept: Bools) -> float | None:
+    """relMSE of the pixels `kept`, bool (H, W), as if there were no others: they give mean(R), and 0.1 % of them go.
+
+    None where nothing is kept, or nothing of it is lit in the reference.
+    """
+    if not np.asarray(reference)[kept].any():
+        return None
+    return relmse(image, reference, kept)[0]
+
+
+def rmse(image: Any, reference: Any, hit: Hit = None) -> float:
+    """Root of the mean of (I - R)^2, in units of radiance."""
+    return _pair(image, reference, hit, NAMES).rmse()
+
+
+def bias(image: Any, reference: Any, hit: Hit = None) -> float:
+    """mean(I - R) / mean(R): -0.1 means that a tenth of the light is missing."""
+    return _pair(image, reference, hit, NAMES).bias()
+
+
+def radiance(image: Any, name: str = "image") -> Array:
+    """`image` in double precision, or a SettingError if it is no (H, W, 3) array of finite 32-bit floats.
+
+    What is not finite is counted in pixels. Infinity in 32 bits counts as infinity: radiance is stored so.
+    """
+    array = np.asarray(image)
+    if array.dtype.kind != "f":
+        raise SettingError(f"{name}: holds {array.dtype}; wants linear radiance in floats")
+    if array.ndim != 3 or array.shape[2] != 3 or array.size == 0:
+        raise SettingError(f"{name}: has the shape {array.shape}; wants (height, width, 3)")
+    with np.errstate(over="ignore", invalid="ignore"):
+        double = array.astype(np.float64)
+    bad = ~(np.abs(double) <= LARGEST).all(-1)
+    if bad.any():
+        y, x = np.argwhere(bad)[0]
+        which = f"{bad.sum()} of {bad.size} pixels are"
+        raise SettingError(f"{name}: {which} not finite, first x = {x}, y = {y} from the top left; nothing is averaged")
+    return double
+
+
+def _pair(image: Any, reference: Any, hit: Hit, names: tuple[str, str]) -> _Pair:
+    first, second = radiance(image, names[0]), radiance(reference, names[1])
+    if first.shape != second.shape:
+        sizes = [f"{array.shape[1]}x{array.shape[0]}" for array in (first, second)]
+        raise SettingError(f"{names[0]}: is {sizes[0]}, but {names[1]} is {sizes[1]}; render it at --size {sizes[1]}")
+    mask, count, counted_by = _counted(first, second, hit)
+    if second[mask].sum() < DARKEST * 3 * count or count == 0:
+        raise SettingError(f"{names[1]}: is black; no error is relative to that")
+    return _Pair(first, second, mask, count, counted_by)
+
+
+def _counted(image: Array, reference: Array, hit: Hit) -> tuple[Bools, int, str]:
+    """The pixels that errors are summed over, by how many their mean divides, and how that is known."""
+    everywhere = np.ones(image.shape[:2], np.bool_)
+    lit = int(((image != 0) | (reference != 0)).any(-1).sum())
+    if hit is None:
+        return everywhere, lit, "lit"
+    if isinstance(hit, np.ndarray):
+        if hit.dtype != np.bool_ or hit.shape != everywhere.shape:
+            raise SettingError(f"hit: is {hit.dtype} {hit.shape}; wants bool {everywhere.shape}")
+        return hit, int(hit.sum()), "mask"
+    if not 0 < hit <= 1:
+        raise SettingError(f"hit: {hit} is no fraction of the pixels; wants a number above 0, at most 1")
+    return everywhere, max(round(hit * everywhere.size), lit), "hit fraction"

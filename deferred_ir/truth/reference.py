@@ -1,0 +1,199 @@
+"""Ray-traced references, by paths or by VPLs with perfect visibility, and what is known of their error."""
+
+from __future__ import annotations
+
+import os
+import time as clock
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Bools
+from deferred_ir.base.errors import OutputError, SettingError, did_you_mean
+from deferred_ir.graph.file import load_graph
+from deferred_ir.output.image import check_folder, write_whole
+from deferred_ir.rays.tracer import Tracer
+from deferred_ir.report.run_json import write
+from deferred_ir.scene.scene import Scene
+from deferred_ir.truth.path_tracer import PathTracer, Progress
+from deferred_ir.vpls import sum
+from deferred_ir.vpls.cast import NONE, cast
+
+DEFAULT_SPP = 64
+DISC_SAMPLES = 256
+"""Points of a disc light for the direct light beside VPLs."""
+
+MOST_PIXELS = 1 << 24
+MOST_BOUNCES = 64
+SETTINGS = ("vpl.fov", "vpl.clamp", "vpl.pattern")
+"""What `settings` may hold; all belong to VPLs. The number of bounces is an argument of its own."""
+
+VPL_ERROR = "one set of VPLs cannot tell its own error, which all pixels share; compare several seeds"
+ONE_SAMPLE = "a single sample a pixel cannot tell its own error; take more"
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """radiance, direct, indirect: float32 (H, W, 3), linear RGB, top row first; hit: bool (H, W).
+
+    standard_error: of each value of `radiance`, float32 (H, W, 3), or None where it cannot be told (`meta["note"]`
+    says why). meta: what OUT.json holds.
+    """
+
+    radiance: Array
+    direct: Array
+    indirect: Array
+    hit: Bools
+    standard_error: Array | None
+    meta: Mapping[str, Any]
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write OUT.npy and OUT.json beside it; each appears whole or not at all."""
+        path = Path(path)
+        check_path(path)
+
+        def fill(part: Path) -> None:
+            with part.open("wb") as file:
+                np.save(file, self.radiance)
+            # Last before the image takes its name: so one is not there without the other.
+            write(path.with_suffix(".json"), dict(self.meta))
+
+        write_whole(path, fill)
+
+
+def check_path(path: Path) -> None:
+    """Raise OutputError if a reference cannot be written at `path`."""
+    if path.suffix.lower() != ".npy":
+        raise OutputError(f"{path}: a reference is written as .npy, with a .json beside it; name a .npy")
+    for file in (path, path.with_suffix(".json")):
+        check_folder(file)
+
+
+def reference(
+    scene: Scene,
+    size: tuple[int, int],
+    *,
+    spp: int | None = None,
+    vpls: int | None = None,
+    bounces: int = 1,
+    seed: int = 0,
+    time: float = 0.0,
+    settings: Mapping[str, Any] | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Reference:
+    """A ray-traced image of `scene` at `time` seconds, of `size` (width, height).
+
+    spp: paths a pixel of the path tracer, 64 unless `vpls` is given: the number of VPLs, cast as in a render, with
+    ray-cast visibility. bounces: of indirect light, 0 for direct light alone. settings: {"vpl.param": value} for
+    VPLs, defaults as in a render. The same for any number of `threads` (None: all). progress: called with work done
+    and all work. Raises SettingError, DeviceError (no embreex).
+    """
+    settings = settings or {}
+    _check(size, settings, spp=spp, vpls=vpls, bounces=bounces, seed=seed)
+    start = clock.perf_counter()
+    tell: dict[str, Any] = {"scene": scene.name, "scene_hash": scene.hash, "size": list(size), "bounces": bounces}
+    tell["time"] = time if scene.moves else 0.0
+    scene = scene.at(time).centred
+    paths = PathTracer(scene, Tracer(scene), bounces)
+    if vpls is None:
+        spp = DEFAULT_SPP if spp is None else spp
+        made = _by_paths(paths, size, spp, seed=seed, threads=threads, progress=progress)
+        tell |= {"spp": spp, "seed": seed, "settings": {}}
+    else:
+        params = vpl_params({**settings, "vpl.count": vpls, "vpl.bounces": max(bounces, 1)})
+        made = _by_vpls(paths, size, params, seed=seed, threads=threads, progress=progress)
+        tell |= {"vpls": vpls, "seed": seed, "settings": {name: getattr(params, name[4:]) for name in SETTINGS}}
+    broken = int((~np.isfinite(made.radiance)).any(axis=-1).sum())
+    if broken:
+        raise OutputError(f"{scene.path}: {broken} pixels of the reference are not finite; look for extreme numbers")
+    tell["hit_fraction"] = float(made.hit.mean())
+    return replace(made, meta={**tell, **made.meta, "seconds": round(clock.perf_counter() - start, 3)})
+
+
+def _check(
+    size: tuple[int, int], settings: Mapping[str, Any], *, spp: int | None, vpls: int | None, bounces: int, seed: int
+) -> None:
+    if spp is not None and vpls is not None:
+        raise SettingError("spp and vpls: a reference is either of paths or of VPLs; give one of the two")
+    numbers = {"width": size[0], "height": size[1], "spp": spp, "vpls": vpls, "bounces": bounces, "seed": seed}
+    if bounces > MOST_BOUNCES:
+        raise SettingError(f"bounces: is {bounces}, but {MOST_BOUNCES} are the most")
+    for name, number in numbers.items():
+        least = 0 if name in ("bounces", "seed") else 1
+        if number is not None and number < least:
+            raise SettingError(f"{name}: is {number}, but wants a whole number from {least} up")
+    if size[0] * size[1] > MOST_PIXELS:
+        raise SettingError(f"size {size[0]}x{size[1]}: a reference has at most {MOST_PIXELS} pixels; take fewer")
+    for name in settings:
+        if name not in SETTINGS:
+            raise SettingError(f"set {name}: no such setting of a reference{did_you_mean(name, SETTINGS)}")
+    if settings and vpls is None:
+        raise SettingError(f"set {min(settings)}: belongs to VPLs, and paths have none; give --vpls N, or leave it out")
+
+
+def vpl_params(settings: Mapping[str, Any]) -> Any:
+    """The parameters of VPLs as a render has them, with `settings` on top; cones may open to 180 degrees here.
+
+    Shadow maps end a little short of the hemisphere, rays do not.
+    """
+    fov = settings.get("vpl.fov")
+    whole = isinstance(fov, int | float) and fov == 180
+    rest = {name: value for name, value in settings.items() if not (whole and name == "vpl.fov")}
+    params: Any = load_graph("deferred", rest).nodes["vpl"].work.params
+    return replace(params, fov=180.0) if whole else params
+
+
+def _by_paths(
+    paths: PathTracer, size: tuple[int, int], spp: int, *, seed: int, threads: int | None, progress: Progress | None
+) -> Reference:
+    found = paths.estimate(size, spp, seed, threads, progress)
+    radiance = found.direct + found.indirect
+    told: dict[str, Any] = {"standard_error": None, "noise": None, "note": ONE_SAMPLE}
+    if found.variance is not None:
+        told = errors(radiance, found.variance, found.hit)
+    return Reference(
+        radiance.astype(np.float32),
+        found.direct.astype(np.float32),
+        found.indirect.astype(np.float32),
+        found.hit,
+        None if found.variance is None else np.sqrt(found.variance).astype(np.float32),
+        told,
+    )
+
+
+def errors(radiance: Array, variance: Array, hit: Bools) -> dict[str, float]:
+    """What an image (H, W, 3) knows of its own error, over the pixels that are `hit`.
+
+    standard_error: the mean standard error of a value, over the mean radiance. noise: the relMSE (untrimmed) against
+    the exact image that is to be expected.
+    """
+    mean = float(radiance[hit].mean()) if hit.any() else 0.0
+    if mean == 0:
+        return {"standard_error": 0.0, "noise": 0.0}
+    relative = variance[hit] / (radiance[hit] ** 2 + 0.01 * mean**2)
+    return {"standard_error": float(np.sqrt(variance[hit]).mean() / mean), "noise": float(relative.mean())}
+
+
+def _by_vpls(
+    paths: PathTracer, size: tuple[int, int], params: Any, *, seed: int, threads: int | None, progress: Progress | None
+) -> Reference:
+    scene, tracer, bounces = paths.scene, paths.tracer, paths.bounces
+    seen = paths.seen(size)
+    direct = paths.direct(size, DISC_SAMPLES, seed, threads)
+    shines = bounces > 0 and any(scene.spotlight.emission)
+    lights = cast(scene.spotlight, tracer, params.count, params.pattern, seed, bounces=bounces) if shines else NONE
+    indirect = sum.indirect(
+        tracer, seen, lights, fov=params.fov, clamp=params.clamp_fraction, threads=threads, progress=progress
+    ).reshape(direct.shape)
+    return Reference(
+        (direct + indirect).astype(np.float32),
+        direct.astype(np.float32),
+        indirect.astype(np.float32),
+        seen.hit.reshape(direct.shape[:2]),
+        None,
+        {"vpls_alive": len(lights), "standard_error": None, "noise": None, "note": VPL_ERROR},
+    )

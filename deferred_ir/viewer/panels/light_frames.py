@@ -1,0 +1,71 @@
+"""Light and VPLs drawn as local frames: x red, y green, z, where it shines, blue. What a surface hides is dim."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Bools
+from deferred_ir.gl.textures import GpuBuffer
+from deferred_ir.scene.lights.spot import LIGHT
+from deferred_ir.viewer.canvas import Area
+from deferred_ir.viewer.session import Session
+
+LENGTH = 0.02
+"""Of an axis, diagonals of the scene; the spotlight's are three times as long."""
+COLORS = ((1.0, 0.25, 0.2), (0.3, 0.9, 0.3), (0.3, 0.5, 1.0))
+DIM = 0.25
+
+
+def records(session: Session) -> np.ndarray | None:
+    """The LIGHT records of the last frame, from whichever step writes them."""
+    for step in session.plan.steps:
+        for port, output in step.outputs.items():
+            found = session.output((step.name, port)) if getattr(output.description, "format", "") == "light" else None
+            if isinstance(found, GpuBuffer) and found.records.dtype == LIGHT:
+                return found.records
+    return None
+
+
+def project(points: Array, session: Session) -> tuple[Array, Bools]:
+    """Pixels (n, 2) of the picture, y down, for points (n, 3), and which lie before the eye, bool (n,)."""
+    eye, (width, height) = session.eye, session.size
+    a, b, c = eye.ray_axes((width, height))
+    d = points - np.asarray(eye.position)
+    depth = d @ c
+    front = depth > 1e-6 * session.scene.geometry.diagonal
+    w = np.where(front, depth, 1.0)
+    x, y = d @ a / (a @ a) / w, d @ b / (b @ b) / w
+    return np.stack([(x + 1) / 2 * width, (1 - y) / 2 * height], axis=-1), front
+
+
+def draw(imgui: Any, session: Session, area: Area, window_height: int, covered: int = 0) -> None:
+    """Draw all frames over the picture in `area`, but over a square of `covered` pixels in its lower left corner."""
+    lights = records(session)
+    if lights is None:
+        return
+    origin, centre = lights["position"].astype(float), session.scene.geometry.centre
+    axes = np.stack([lights[name] for name in ("x_axis", "y_axis", "z_axis")], axis=1).astype(float)
+    axes /= np.maximum(np.linalg.norm(axes, axis=-1, keepdims=True), 1e-30)
+    length = np.full(len(lights), LENGTH * session.scene.geometry.diagonal)
+    length[0] *= 3
+    tips = origin[:, None] + axes * length[:, None, None]
+    tracer = session.renderer.tracer()
+    lifted = tracer.lift(origin, axes[:, 2])
+    hidden = tracer.occluded(np.broadcast_to(np.subtract(session.eye.position, centre), lifted.shape), lifted)
+    origin, tips = origin + centre, tips + centre
+    start, start_seen = project(origin, session)
+    end, end_seen = project(tips.reshape(-1, 3), session)
+    end, end_seen = end.reshape(-1, 3, 2), end_seen.reshape(-1, 3)
+    shift = np.array([area.x, window_height - area.y - area.height])
+    lines = imgui.get_background_draw_list()
+    lines.push_clip_rect(imgui.ImVec2(*shift), imgui.ImVec2(shift[0] + area.width, shift[1] + area.height))
+    free = (start[:, 0] > covered) | (start[:, 1] < session.size[1] - covered)
+    for i in np.flatnonzero(start_seen & free):
+        for axis, color in enumerate(COLORS):
+            if end_seen[i, axis]:
+                packed = imgui.get_color_u32(imgui.ImVec4(*color, DIM if hidden[i] else 1.0))
+                a, b = start[i] + shift, end[i, axis] + shift
+                lines.add_line(imgui.ImVec2(*a), imgui.ImVec2(*b), packed, 3.0 if i == 0 else 1.5)
+    lines.pop_clip_rect()

@@ -1,0 +1,1 @@
+"""The laboratory of many lights: casting, choosing, keeping and summing VPLs. No OpenGL."""

@@ -1,0 +1,112 @@
+"""Casting virtual point lights: rays from the spotlight, a diffuse light where each lands (Keller 1997).
+
+Rays are uniform on the disc of radius r = sin(fov/2), lifted to the sphere (Nusselt's analogue), so each of N carries
+E r^2/N cone(theta), and the VPL it makes has E_i = E r^2/N cone(theta) rho. As N grows, their sum is exactly one
+diffuse bounce. With a disc light, each ray starts at a point of the disc of its own.
+
+Further bounces continue the paths. Of the lights of one bounce, M are drawn by systematic resampling with probability
+proportional to their luminous power, and a ray leaves each about its normal, cosine-distributed. M falls from bounce to
+bounce as the power does, so that all VPLs carry about the same, as in Keller's fixed fractions; but where those go by
+the scene's mean reflectance, drawing by power is unbiased in any scene, and unlike with Russian roulette the luminous
+power of a bounce does not fluctuate: what M rays carry on is exactly what arrived.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.rays.tracer import Tracer
+from deferred_ir.sampling.patterns import Pattern, disc, systematic, unit_disc, unit_square
+from deferred_ir.scene.lights.spot import Spotlight, frames
+
+
+@dataclass(frozen=True, eq=False)
+class Vpls:
+    """n living VPLs; float64 (n, 3) each. They shine as I(w) = emission cos(theta) about their normal.
+
+    ray: int (n,), which of its bounce's rays made it.
+    """
+
+    position: Array
+    normal: Array
+    emission: Array
+    ray: Ints
+
+    def __len__(self) -> int:
+        return len(self.ray)
+
+
+NONE = Vpls(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, int))
+
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def cast(
+    light: Spotlight, tracer: Tracer, count: int, pattern: Pattern = "random", seed: int = 0, *, bounces: int = 1
+) -> Vpls:
+    """The VPLs of `count` rays and `bounces` bounces, the first bounce's first.
+
+    Rays that miss or have no power make none and are not replaced.
+    """
+    if count == 0:
+        return NONE
+    origins, directions = _leave(light, count, pattern, seed)
+    radius = np.sin(np.radians(light.fov) / 2)
+    carried = np.multiply.outer(light.cone(directions) * radius**2 / count, np.asarray(light.emission, float))
+    left = (carried @ LUMINANCE).sum()
+    made = [_land(tracer, origins, directions, carried)]
+    for bounce in range(1, bounces):
+        last = made[-1]
+        power = last.emission @ LUMINANCE
+        # Smooth normals can bend the light up; buffers have room for `count` a bounce.
+        rays = min(count, round(count * power.sum() / left)) if left > 0 else 0
+        if rays == 0:
+            break
+        rng = np.random.default_rng([seed, bounce])
+        drawn = systematic(power, rays, rng.random())
+        # Each bounce has a pattern of its own, shuffled: in its own order it would go with that of the bounce before.
+        square = rng.permutation(unit_square(pattern, rays, seed + bounce * 7919))
+        normal = last.normal[drawn]
+        carried = last.emission[drawn] * (power.sum() / (rays * power[drawn]))[:, None]
+        made.append(
+            _land(tracer, tracer.lift(last.position[drawn], normal), lift_to_hemisphere(disc(square), normal), carried)
+        )
+    if len(made) == 1:
+        return made[0]
+    return Vpls(*(np.concatenate([getattr(part, f.name) for part in made]) for f in fields(Vpls)))
+
+
+def _leave(light: Spotlight, count: int, pattern: Pattern, seed: int) -> tuple[Array, Array]:
+    """Where the rays of the first bounce start, and their unit directions."""
+    points = unit_disc(pattern, count, seed) * np.sin(np.radians(light.fov) / 2)
+    origins = np.broadcast_to(np.asarray(light.position, float), (count, 3))
+    if light.radius > 0:
+        on_disc = disc(np.random.default_rng([seed, 0]).permutation(unit_square(pattern, count, seed + 104729)))
+        right, up = frames(light.axis)
+        origins = origins + light.radius * (on_disc[:, :1] * right + on_disc[:, 1:] * up)
+    return origins, lift_to_hemisphere(points, light.axis[None])
+
+
+def lift_to_hemisphere(points: Array, axes: Array) -> Array:
+    """Points of the unit disc (n, 2) to unit directions about `axes` (n, 3) or (1, 3), on the hemisphere above them."""
+    right, up = frames(axes)
+    height = np.sqrt(np.maximum(1 - (points**2).sum(axis=1, keepdims=True), 0))
+    directions: Array = points[:, :1] * right + points[:, 1:] * up + height * axes
+    return directions
+
+
+def _land(tracer: Tracer, origins: Array, directions: Array, carried: Array) -> Vpls:
+    """VPLs where rays land that carry `carried` (n, 3)."""
+    hits = tracer.closest(origins, directions)
+    # Radiance at a hit goes with the shading normal's cosine to the light, but the surface that receives the ray and
+    # radiates is the geometric one; the ratio of the two cosines makes the sum exact (Veach 1997, section 5.3).
+    arriving = np.maximum(-(hits.shading_normal * directions).sum(axis=1), 0)
+    crossing = -(hits.normal * directions).sum(axis=1)
+    ratio = np.divide(arriving, crossing, out=np.zeros(len(crossing)), where=crossing > 0)
+    emission = carried * hits.albedo * ratio[:, None]
+    alive = np.flatnonzero(hits.hit & (emission > 0).any(axis=1))
+    return Vpls(hits.position[alive], hits.normal[alive], emission[alive], alive)

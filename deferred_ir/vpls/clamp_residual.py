@@ -1,0 +1,146 @@
+"""What the clamp on 1/d^2 takes, given back by short rays (Kollig and Keller 2004, Illumination in the Presence of Weak
+Singularities).
+
+VPLs light a point x with 1/d^2 * min(1, d^2/c^2). What is missing is an integral over the directions whose first hit y
+lies nearer than c, of L(y) cos (1 - d^2/c^2), and cosine-distributed rays of length c estimate it without any
+singularity. Together the two are exact. Rays carry on from y where VPLs have more than one bounce.
+
+Each pixel of a block takes other cells of one stratification, so that the mean over any window of a block's size is
+that of a well spread set: the image is made to be filtered. Each seed deals the cells anew, so that the mean over seeds
+is right at every pixel.
+"""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import dataclass
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.base.parallel import in_order
+from deferred_ir.rays.direct import lit_by
+from deferred_ir.rays.pixel_surfaces import Surfaces
+from deferred_ir.rays.tracer import Hits, Tracer
+from deferred_ir.sampling import pixel_blocks
+from deferred_ir.scene.lights.spot import Spotlight
+
+RAYS = 1 << 14
+"""Rays of a task: few enough for their arrays to stay in a core's cache."""
+
+
+@dataclass(frozen=True)
+class VplLimits:
+    """What VPLs leave out of the light nearby. clamp: c, world units. cosine: of half their cone's angle."""
+
+    clamp: float
+    cosine: float = 0.0
+
+    def missing(self, square: Array, leaving: Array) -> Array:
+        """The share of light that VPLs at a squared distance (n,) do not bring; `leaving`: cosine there, (n,).
+
+        All of it outside their cone, and none from farther than c, where a cone's loss is theirs for good.
+        """
+        share: Array = np.maximum(1 - square / self.clamp**2, 0)
+        share[(leaving < self.cosine) & (share > 0)] = 1
+        return share
+
+
+def residual(
+    tracer: Tracer,
+    light: Spotlight,
+    seen: Surfaces,
+    size: tuple[int, int],
+    limits: VplLimits,
+    *,
+    samples: float,
+    block: int,
+    bounces: int = 1,
+    seed: int = 0,
+    threads: int | None = None,
+) -> Array:
+    """Irradiance that VPLs of `bounces` bounces miss, float32 (H, W, 4), bottom row first, unfiltered.
+
+    size: (width, height). samples: rays a pixel, below 1 the share of pixels that trace one, above 1 a whole number.
+    block: 1, 2, 4 or 8; the mean over any window of block x block pixels is right. alpha: weight of the pixel in that
+    mean, 0 where no ray was traced or nothing was seen. The same for any number of threads.
+    """
+    width, height = size
+    image = np.zeros((height * width, 4), np.float32)
+    if limits.clamp <= 0:
+        return image.reshape(height, width, 4)
+    dealing = np.random.default_rng(seed)
+    traced, index, total = pixel_blocks.deal(seen.pixel, width, samples, block, int(dealing.integers(block * block)))
+    shift = dealing.random(2, np.float32)
+    each = index.shape[1]
+    weight = block * block * each / total
+    per_task = max(1, RAYS // each)
+    tasks = [(i, slice(start, start + per_task)) for i, start in enumerate(range(0, len(traced), per_task))]
+    lattice = pixel_blocks.lattice(total)
+    rays, emission = _Rays(tracer, light, seen, limits, bounces), np.asarray(light.emission, float)
+
+    def work(task: tuple[int, slice]) -> Array:
+        number, chosen = task
+        rng = np.random.default_rng([seed, number])
+        rows = np.repeat(traced[chosen], each)
+        points = (pixel_blocks.jittered(index[chosen].reshape(-1), lattice, rng) + shift) % 1
+        brought: Array = rays.bring(rows, points, rng).reshape(-1, each, 3).mean(axis=1) * emission
+        return brought
+
+    with closing(in_order(work, tasks, threads)) as results:
+        for (_, chosen), part in zip(tasks, results, strict=True):
+            pixels = seen.pixel[traced[chosen]]
+            image[pixels, :3] = part * weight
+            image[pixels, 3] = weight
+    return image.reshape(height, width, 4)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rays:
+    """Short rays from what is seen, and how they carry on."""
+
+    tracer: Tracer
+    light: Spotlight
+    seen: Surfaces
+    limits: VplLimits
+    bounces: int
+
+    def bring(self, rows: Ints, points: Array, rng: np.random.Generator) -> Array:
+        """Irradiance over emission that one ray from each of the surfaces `rows` brings, float64 (n, 3)."""
+        tracer, position, normal = self.tracer, self.seen.position[rows], self.seen.normal[rows]
+        directions, above = _about(self.seen.shading_normal[rows], normal, points)
+        start = tracer.lift(position[above], normal[above])
+        found, at = tracer.within(start, directions[above], self.limits.clamp + tracer.offset)
+        rays = above[found]
+        way = position[rays] - at.position
+        square = np.einsum("ij,ij->i", way, way)
+        leaving = np.einsum("ij,ij->i", way, at.normal) / np.sqrt(np.maximum(square, np.finfo(float).tiny))
+        carried = np.zeros((len(rows), 3))
+        throughput: Array = at.albedo * self.limits.missing(square, leaving)[:, None]
+        for bounce in range(self.bounces):
+            if bounce:
+                rays, throughput, at = self._carry_on(rays, throughput, at, rng)
+            carried[rays] += throughput * lit_by(self.light, tracer, at, rng)[:, None]
+        return carried
+
+    def _carry_on(self, rays: Ints, throughput: Array, at: Hits, rng: np.random.Generator) -> tuple[Ints, Array, Hits]:
+        """One bounce more: what is left of the rays, and where they land."""
+        directions, above = _about(at.shading_normal, at.normal, rng.random((len(rays), 2)))
+        start = self.tracer.lift(at.position[above], at.normal[above])
+        found, landed = self.tracer.within(start, directions[above], np.inf)
+        kept = above[found]
+        return rays[kept], throughput[kept] * landed.albedo, landed
+
+
+def _about(shading_normals: Array, normals: Array, points: Array) -> tuple[Array, Ints]:
+    """Unit directions, cosine-distributed about shading normals (n, 3), and the rows of those above their face.
+
+    A unit normal plus a point of the unit sphere (Archimedes' map of `points`, (n, 2)), which needs no frame.
+    """
+    height, angle = 1 - 2 * points[:, 0], 2 * np.pi * points[:, 1]
+    radius = np.sqrt(np.maximum(1 - height * height, 0))
+    directions = shading_normals + np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
+    square = np.einsum("ij,ij->i", directions, directions)
+    above = np.flatnonzero((np.einsum("ij,ij->i", directions, normals) > 0) & (square > 0))
+    directions /= np.sqrt(np.maximum(square, np.finfo(directions.dtype).tiny))[:, None]
+    return directions, above

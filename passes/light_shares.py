@@ -1,0 +1,70 @@
+"""Light each pixel by its share of the VPLs: vpls, G-buffer, shadows -> irradiance, in sub-buffers.
+
+Pixels with the same share stand together (Segovia et al. 2006), so that each draw has one list of lights. The G-buffer
+is read with stride n, not copied.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.light_culling import last_shining
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.graph import Description, Facts, Input, Output, Pass, Texture
+from deferred_ir.shadows import shader_variants
+from deferred_ir.vpls.shares import share_starts, sub_buffers
+
+
+class Interleaved(Pass):
+    """Irradiance from n^2 times a pixel's share of the VPLs."""
+
+    inputs: ClassVar[Mapping[str, Input]] = {
+        "vpls": Input("the VPLs in the order of their shares", format="share"),
+        "depth": Input("reversed depth", format="depth32f"),
+        "normals": Input("shading and geometric normal", format="rgba16"),
+        "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
+        "rays": Input("which VPLs are seen, instead of maps", format="r32ui", optional=True),
+        "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
+    }
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Irradiance before albedo, which the filter must not blur."""
+        del inputs
+        return {"shares": Output("irradiance in sub-buffers; 0 on the background", Texture("rgba32f"), transient=True)}
+
+    def depends(self) -> frozenset[str]:
+        """Positions come back from the depth."""
+        return frozenset({"camera"})
+
+    def unneeded(self, facts: Facts) -> str | None:
+        """Without VPLs there is no light to share."""
+        return None if facts.vpls else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """A draw for each share, or more where it crosses from block to block of the buffer."""
+        vpls, n = io["vpls"], int(io.defines["INTERLEAVE"])
+        ctx, block = io.gpu.ctx, vpls.description.block
+        program = io.program("light_shares.frag", defines=shader_variants.of_pixels(frame, vpls.records))
+        ctx.blend_func = ctx.ONE, ctx.ONE
+        starts = share_starts(len(vpls.records), n).tolist()
+        for share, rectangle in enumerate(sub_buffers(frame.size, n)):
+            io.gpu.gl.Viewport(*rectangle)
+            start, stop = starts[share : share + 2]
+            # An empty share is drawn as well: the filter counts its pixels.
+            for number in range(start // block, max(stop - 1, start) // block + 1):
+                vpls.bind_uniform(1, number)
+                first, end = max(start, number * block), min(stop, (number + 1) * block)
+                begins, count = first == start, last_shining(vpls.records[first:end])
+                if not begins and not count:
+                    continue
+                first -= number * block
+                (ctx.disable if begins else ctx.enable)(ctx.BLEND)  # what begins a share writes all of its pixels
+                program.set(share=(share % n, share // n), begins=begins, first=first, end=first + count)
+                if io["rays"]:
+                    program.set(before=number * block - start)
+                program.draw_fullscreen()
+
+
+PASS = Interleaved

@@ -1,0 +1,1 @@
+"""Checks of a scene against rays, and of what must not grow."""

@@ -1,0 +1,79 @@
+"""What the cases of stability_cases.py do to a scene's normals, colours and textures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array
+from deferred_ir.loading.models import homed
+from deferred_ir.profiling.checks.change_triangles import with_geometry
+from deferred_ir.scene.scene import Scene, Texture
+
+GREY = 188
+"""In sRGB; about half in linear light."""
+
+
+def with_albedo(scene: Scene, albedo: float) -> Scene:
+    """All surfaces of one reflectance, without textures and colours."""
+    materials = tuple(replace(material, albedo=(albedo,) * 3, texture=None) for material in scene.materials)
+    return with_geometry(replace(scene, materials=materials, textures=()), colors=None, uvs=None)
+
+
+def _apart(scene: Scene, normals: Array | None) -> Scene:
+    """Faces that share no vertices, with shading normals (3 F, 3), corner by corner."""
+    g = scene.geometry
+    corners = g.faces.ravel()
+    return with_geometry(
+        scene,
+        positions=g.positions[corners],
+        faces=np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
+        normals=None if normals is None else normals.astype(np.float32),
+        uvs=None if g.uvs is None else g.uvs[corners],
+        colors=None if g.colors is None else g.colors[corners],
+    )
+
+
+def faceted(scene: Scene) -> Scene:
+    """Without shading normals."""
+    return _apart(scene, None)
+
+
+def with_normals(scene: Scene, value: float) -> Scene:
+    """Shading normals of `value` in all places."""
+    return _apart(scene, np.full((scene.geometry.faces.size, 3), value))
+
+
+def against_the_faces(scene: Scene) -> Scene:
+    """Shading normals that are the faces' own, the other way round."""
+    return _apart(scene, -np.repeat(scene.geometry.face_normals, 3, axis=0))
+
+
+def painted(scene: Scene) -> Scene:
+    """All surfaces of the grey that `papered` has, without a texture."""
+    from deferred_ir.scene.materials import srgb_table
+
+    return with_albedo(scene, float(srgb_table()[GREY].astype(np.float16)))
+
+
+def papered(scene: Scene, size: int) -> Scene:
+    """All surfaces grey, by a texture of size x size texels."""
+    return _with_texture(scene, np.full((size, size, 3), GREY, np.uint8), 0.0)
+
+
+def checkered(scene: Scene, shift: float = 0.0) -> Scene:
+    """All surfaces with a texture of 8x8 random greys; coordinates begin at `shift`, as a file has them."""
+    greys = np.random.default_rng(3).integers(60, 250, (8, 8, 1))
+    return _with_texture(scene, np.repeat(greys, 3, axis=2).astype(np.uint8), shift)
+
+
+def _with_texture(scene: Scene, pixels: Array, shift: float) -> Scene:
+    plain = with_albedo(scene, 1.0)
+    uvs = homed((plain.geometry.positions - plain.geometry.bounds[0])[:, :2] / plain.geometry.diagonal + shift)
+    paper = replace(
+        plain,
+        materials=tuple(replace(material, texture=0) for material in plain.materials),
+        textures=(Texture("paper", pixels),),
+    )
+    return with_geometry(paper, uvs=uvs.astype(np.float32))

@@ -1,0 +1,200 @@
+"""A long run in one process: whether memory and OpenGL's objects stay as they are, and images what they were.
+
+    python -m deferred_ir.profiling.checks.soak --frames 20000 --loads 500
+
+Stretches of frames, each with other settings and a light that moves, come round again and again on one renderer, and
+in between scenes are loaded anew, one in ten on a context of its own. The first tenth counts as warming up. Exit
+status 1 where something grows afterwards or an image differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import gc
+import hashlib
+import resource
+import sys
+import time as clock
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+import deferred_ir as ir
+from deferred_ir.engine.record import Record
+from deferred_ir.profiling.measure import markdown
+from deferred_ir.scene.motion import FRAMES_PER_SECOND, LissajousMotion
+from deferred_ir.scene.scene import Scene
+
+STRETCH = 20
+"""Frames with the same settings."""
+FRESH = 10
+"""One in so many loads, the first among them, gets a context of its own."""
+SCENES = ("cornell", "colors")
+SLACK = 8
+"""MiB that resident memory may grow by: allocators and drivers take it in larger pieces."""
+SETTINGS: tuple[dict[str, Any], ...] = (
+    {"graph": "deferred", "size": (48, 32), "set": {"vpl.count": 16}},
+    {"graph": "deferred", "size": (48, 32), "set": {"vpl.count": 16, "tonemap.exposure": 1.0}},
+    {"graph": "deferred", "size": (32, 48), "set": {"vpl.count": 4, "shadow_maps.vpl_size": 32}},
+    {"graph": "hemisphere", "size": (32, 48), "set": {"vpl.count": 8}},
+    {"graph": "interleaved", "size": (48, 32), "set": {"vpl.count": 16}},
+    {"graph": "incremental", "size": (48, 32), "set": {"vpl.count": 16}},
+    {"graph": "accurate", "size": (48, 32), "set": {"vpl.count": 16}},
+    {"graph": "forward", "size": (48, 32), "set": {"vpl.count": 4, "shadow_maps.spot_size": 256}},
+)
+
+ROUND = 2 * len(SETTINGS)
+"""Stretches until all has been: all settings, redoing everything and reusing what has not changed."""
+
+
+@dataclass(frozen=True)
+class Count:
+    """What there was after so many frames and loads: objects by kind, and memory in MiB."""
+
+    frames: int
+    loads: int
+    objects: dict[str, int]
+    memory: float
+
+
+@dataclass
+class Soak:
+    """What has been done and seen. images: the first of each kind, as digests."""
+
+    frames: int = 0
+    loads: int = 0
+    counts: list[Count] = field(default_factory=list)
+    images: dict[str, str] = field(default_factory=dict)
+    different: list[str] = field(default_factory=list)
+
+    def note(self, one: ir.Renderer) -> None:
+        """Count objects and memory."""
+        with one.gpu.ctx:
+            self.counts.append(Count(self.frames, self.loads, one.gpu.gl.objects(), held()))
+
+    def compare(self, kind: str, image: ir.Image) -> None:
+        """Hold an image against the first of its kind."""
+        assert image.radiance is not None
+        assert image.display is not None
+        digest = hashlib.sha256(image.radiance.tobytes() + image.display.tobytes()).hexdigest()
+        if self.images.setdefault(kind, digest) != digest:
+            self.different.append(f"another image: {kind}, after {self.frames} frames and {self.loads} loads")
+
+    @property
+    def warm(self) -> Count:
+        """After a tenth of the run: programs are compiled by then, and allocators have had their worst moments."""
+        return self.counts[len(self.counts) // 10]
+
+    @property
+    def faults(self) -> list[str]:
+        """What is not as it was after a tenth of the run."""
+        first, last = self.warm, self.counts[-1]
+        grown = [
+            f"{kind}: {count} became {last.objects[kind]}"
+            for kind, count in first.objects.items()
+            if last.objects[kind] > count
+        ]
+        if last.memory > first.memory + SLACK:
+            grown.append(f"memory: {first.memory:.0f} MiB became {last.memory:.0f}")
+        return grown + self.different
+
+
+def held() -> float:
+    """MiB resident once all that is free is given back to Linux: else allocators keep as much as there ever was."""
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize() / 2**20
+
+
+def soak(frames: int, loads: int, seconds: float) -> Iterator[Soak]:
+    """Runs stretch after stretch; after each what has been done. Ends when all is done, or after `seconds`."""
+    done, until = Soak(), clock.monotonic() + seconds
+    stretches = -(-frames // STRETCH)
+    scene = moving(ir.load("cornell"))
+    with ir.Renderer(**SETTINGS[0]) as one:
+        for number in range(stretches):
+            if clock.monotonic() > until:
+                break
+            which = number % len(SETTINGS)
+            one.reuse = number % ROUND >= len(SETTINGS)
+            one.configure(**SETTINGS[which])
+            done.compare(f"setting {which}", stretch(one, scene, min(STRETCH, frames - done.frames)))
+            done.frames += min(STRETCH, frames - done.frames)
+            for _ in range(loads * (number + 1) // stretches - done.loads):
+                done.loads += 1
+                load(one, SCENES[done.loads % len(SCENES)], done)
+            if number % ROUND == ROUND - 1 or number == stretches - 1:
+                done.note(one)
+            yield done
+
+
+def moving(scene: Scene) -> Scene:
+    """The scene with a light that moves."""
+    reach = 0.05 * scene.geometry.diagonal
+    motion = LissajousMotion((reach, reach / 4, reach), (3.0, 2.0))
+    return replace(scene, spotlight=replace(scene.spotlight, motion=motion))
+
+
+def stretch(one: ir.Renderer, scene: Scene, frames: int) -> ir.Image:
+    """The last of some frames that begin afresh, each timed; the last frame of a shorter stretch is drawn anyway."""
+    one.reset()
+    plan, record = one.plan(scene), Record()
+    for frame in [*range(frames - 1), STRETCH - 1]:
+        one.draw(scene, plan, time=frame / FRAMES_PER_SECOND, record=record)
+    one.finish(record)
+    return one.read(plan)
+
+
+def load(one: ir.Renderer, name: str, done: Soak) -> None:
+    """Load a scene and render it: on `one`, or every now and then on a context of its own."""
+    scene = ir.load(name)
+    if done.loads % FRESH != 1:
+        one.reset()
+        one.configure(**SETTINGS[0])
+        done.compare(name, one.render(scene))
+    else:
+        with ir.Renderer(**SETTINGS[0]) as other:
+            done.compare(name, other.render(scene))
+
+
+def table(done: Soak) -> str:
+    """Markdown: objects and memory after a tenth of the run, half-way and at the end."""
+    chosen = [done.warm, done.counts[len(done.counts) // 2], done.counts[-1]]
+    head = ("", "frames", "loads", *chosen[0].objects, "MiB")
+    rows = [
+        (when, f"{count.frames}", f"{count.loads}", *map(str, count.objects.values()), f"{count.memory:.0f}")
+        for when, count in zip(("a tenth", "half-way", "end"), chosen, strict=True)
+    ]
+    return markdown(head, rows)
+
+
+def main() -> int:
+    """Run, print the table and what has gone wrong; an exit status."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--frames", type=int, default=20000, metavar="N")
+    parser.add_argument("--loads", type=int, default=500, metavar="N", help="of scenes, among the frames")
+    parser.add_argument("--minutes", type=float, default=30.0, metavar="M", help="at most")
+    chosen = parser.parse_args()
+    done = Soak()
+    try:
+        with tqdm(total=chosen.frames, unit="frame", disable=None) as bar:
+            for done in soak(chosen.frames, chosen.loads, 60 * chosen.minutes):
+                bar.update(done.frames - bar.n)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+    if len(done.counts) < 2:
+        print(f"{done.frames} frames: fewer than two rounds, which tell nothing", file=sys.stderr)
+        return 1
+    print(table(done))
+    for fault in done.faults:
+        print(fault, file=sys.stderr)
+    return 1 if done.faults or done.frames < chosen.frames else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,274 @@
+"""Do shadow maps agree with rays? Pairs of a pixel and a light, asked of both, one row a projection and map size.
+
+A frame pairs each pixel with one light (visibility_pairs.py), and Embree says whether something lies between the two.
+The next frame has other VPLs, other pairs, and a camera turned by less than a pixel. Pairs of one frame share their
+maps and are no independent samples, so a standard error goes by the spread of the frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Bools, Ints
+from deferred_ir.engine.renderer import Renderer
+from deferred_ir.graph.compile import compile
+from deferred_ir.graph.file import graph_hash, load_graph
+from deferred_ir.graph.params import specs
+from deferred_ir.profiling.checks.visibility_pass import FOLDER, VisibilityPairs
+from deferred_ir.rays.tracer import Tracer
+from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.spot import NEAR
+from deferred_ir.scene.scene import Scene
+from deferred_ir.shadows.settings import WIDEST_PLANAR, MapParams
+from deferred_ir.truth.path_tracer import Progress
+
+GRAPH = FOLDER / "visibility.toml"
+PASSES = {"visibility_pairs": VisibilityPairs}
+MAPS = "shadow_maps"
+VPL_SIZE = f"{MAPS}.vpl_size"
+LEAST_FRAMES = 8
+"""Fewer would tell no standard error."""
+MOST_FRAMES = 256
+"""Where hardly a pixel faces a light, the pairs asked for would take for ever."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What is measured. size: (width, height), pixels. pairs: at least so many a row. vpl_sizes: of VPLs' maps, texels.
+
+    settings: {"pass.param": value} for all rows.
+    """
+
+    size: tuple[int, int] = (256, 256)
+    pairs: int = 200_000
+    vpl_sizes: Sequence[int] = (256, 512)
+    seed: int = 0
+    device: str = "auto"
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share of all pairs, or of all light, and its standard error; None where there is none."""
+
+    value: float | None
+    error: float | None
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was found of the lights of one kind ("spotlight", "vpls") in maps of one projection and size (texels).
+
+    mismatch: pairs of which map and ray disagree, the sum of leaks (lit by the map, blocked for the ray) and
+    false_shadows (the reverse). A map that says half or more counts as lit. light_wrong, light_leaked and light_lost:
+    the same with the map's answer as it is, weighted by the irradiance that the pair has without shadow.
+    vpls: rays that were cast for them. size: of a frame, (width, height).
+    """
+
+    scene: str
+    scene_hash: str
+    graph_hash: str
+    size: tuple[int, int]
+    vpls: int
+    seed: int
+    device: str
+    lights: str
+    projection: str
+    map_size: int
+    frames: int
+    pairs: int
+    mismatch: Share
+    leaks: Share
+    false_shadows: Share
+    light_wrong: Share
+    light_leaked: Share
+    light_lost: Share
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class _Maps:
+    """Maps to measure: whose, and how they are made."""
+
+    lights: str
+    projection: str
+    size: int
+
+
+def rows(scene: Scene, options: Options, progress: Progress | None = None) -> Iterator[Row]:
+    """Measure `scene`: for each projection a row for the spotlight, and one for the VPLs with each size of map.
+
+    None where the spotlight is dark. Raises GraphError before the first row for settings that do not fit any.
+    """
+    scene = scene.centred  # as the maps and Embree have it
+    for settings, chosen in _planned(scene, options):
+        with Renderer(options.size, GRAPH, options.device, set=settings, passes=PASSES) as renderer:
+            for maps in chosen:
+                yield _row(renderer, scene, options, maps, _frames(renderer, scene, maps.lights, options, progress))
+
+
+def _planned(scene: Scene, options: Options) -> list[tuple[dict[str, Any], list[_Maps]]]:
+    """Settings, and which maps to measure with them: each kind once, however many settings make it."""
+    planned, known = list[tuple[dict[str, Any], list[_Maps]]](), set[_Maps]()
+    if not scene.facts.emits:
+        return planned
+    wide = scene.spotlight.fov > WIDEST_PLANAR
+    for choice in _projections(options.settings):
+        for vpl_size in options.vpl_sizes:
+            settings = {**options.settings, **choice, VPL_SIZE: vpl_size}
+            graph = load_graph(GRAPH, settings, PASSES)
+            steps = compile(graph, list(graph.outputs), scene.facts).steps
+            step = next(step for step in steps if step.name == MAPS)
+            parts = step.work.subpasses(step.descriptions)  # the spotlight's, then those of VPLs
+            found = [
+                _Maps(lights, "paraboloid" if lights == "spotlight" and wide else part["projection"], part["size"])
+                for lights, part in zip(("spotlight", "vpls"), parts, strict=False)
+            ]
+            planned.append((settings, [maps for maps in found if maps not in known]))
+            known |= set(found)
+    return [(settings, maps) for settings, maps in planned if maps]
+
+
+def _projections(settings: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The settings for each projection that maps can have; only for that which `settings` ask for, if any."""
+    name = f"{MAPS}.projection"
+    choices = [settings[name]] if name in settings else specs(MapParams)["projection"].choices
+    return [{name: choice} for choice in choices]
+
+
+def _frames(renderer: Renderer, scene: Scene, lights: str, options: Options, progress: Progress | None) -> Array:
+    """Sums over the pairs of each frame, (frames, 6), as in `Pairs.sums`."""
+    plan = renderer.plan(scene, outputs=[lights])
+    rng = np.random.default_rng(options.seed)
+    sums: list[Array] = []
+    done = 0
+    while len(sums) < LEAST_FRAMES or (done < options.pairs and len(sums) < MOST_FRAMES):
+        moved = replace(scene, camera=_turned(scene.at(0).camera, options.size, rng.random(2) - 0.5))
+        renderer.draw(moved, plan, seed=options.seed * MOST_FRAMES + len(sums))
+        sums.append(judged(renderer, moved, plan.outputs[lights][0]).sums())
+        done += int(sums[-1][0])
+        if progress:
+            progress(done, max(options.pairs, done))
+        if done == 0 and len(sums) == LEAST_FRAMES:
+            break  # the camera sees nothing that faces a light
+    return np.array(sums)
+
+
+def _turned(camera: Camera, size: tuple[int, int], pixels: Array) -> Camera:
+    """The camera turned to the right and up by `pixels` (2,) of an image of `size`."""
+    right, up, forward = camera.ray_axes(size)
+    away = np.linalg.norm(np.subtract(camera.look_at, camera.position))
+    aim = np.asarray(camera.position) + away * (
+        forward + right * (2 * pixels[0] / size[0]) + up * (2 * pixels[1] / size[1])
+    )
+    return replace(camera, look_at=(float(aim[0]), float(aim[1]), float(aim[2])), motion=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """n pairs of a frame that face each other, the pixel within the light's cone; arrays are float64.
+
+    light: its number in the buffer, int (n,). position, normal: the pixel's surface, (n, 3). shown: what the map says,
+    (n,) from 0 to 1. lit: what the ray says, bool (n,). irradiance: without shadow, its luminance, (n,).
+    """
+
+    light: Ints
+    position: Array
+    normal: Array
+    shown: Array
+    lit: Bools
+    irradiance: Array
+
+    def sums(self) -> Array:
+        """Number of pairs, leaks and false shadows, then light in all, leaked and lost, (6,)."""
+        shown, lit = self.shown >= 0.5, self.lit
+        leaked, lost = (self.irradiance @ np.maximum(off, 0) for off in (self.shown - lit, lit - self.shown))
+        return np.array([len(lit), (shown & ~lit).sum(), (~shown & lit).sum(), self.irradiance.sum(), leaked, lost])
+
+
+def judged(renderer: Renderer, scene: Scene, source: str) -> Pairs:
+    """The pairs of the frame of `scene` drawn last that pass `source` made, and what rays say of them."""
+    with renderer.gpu.ctx:
+        pairs, facing = (renderer.executor.resource((source, port)).read()[::-1] for port in ("pairs", "facing"))
+        records = renderer.executor.resource(("vpl", "lights")).records
+    counts = pairs[..., 2] > 0  # what faces away, or lies outside the cone, gets nothing
+    number, shown, irradiance, depth = pairs[counts].astype(np.float64).T
+    away = np.float32(NEAR * scene.geometry.scale) / depth
+    position = np.asarray(scene.camera.position) + scene.camera.rays(renderer.size)[counts] * away[:, None]
+    normal, light = facing[counts, :3].astype(np.float64), number.astype(int)
+    lit = ~_blocked(renderer.tracer(), position, normal, records[light])
+    return Pairs(light, position, normal, shown, lit, irradiance)
+
+
+def _blocked(tracer: Tracer, position: Array, normal: Array, lights: np.ndarray) -> Bools:
+    """Whether anything lies between surface points (n, 3) with unit `normal` (n, 3) and the LIGHT records (n,)."""
+    target = lights["position"].astype(np.float64)
+    on_surface = lights["tile"] >= 0  # a VPL; the spotlight hangs free
+    target[on_surface] = tracer.lift(target[on_surface], lights["z_axis"][on_surface].astype(np.float64))
+    return tracer.occluded(tracer.lift(position, normal), target)
+
+
+def _row(renderer: Renderer, scene: Scene, options: Options, maps: _Maps, sums: Array) -> Row:
+    pairs, leaks, false_shadows, light, leaked, lost = sums.T
+    graph = renderer.graph()
+    return Row(
+        scene=scene.name,
+        scene_hash=scene.hash,
+        graph_hash=graph_hash(graph),
+        size=renderer.size,
+        vpls=graph.nodes["vpl"].work.params.count,
+        seed=options.seed,
+        device=renderer.gpu.device.name,
+        lights=maps.lights,
+        projection=maps.projection,
+        map_size=maps.size,
+        frames=len(sums),
+        pairs=int(pairs.sum()),
+        mismatch=_share(leaks + false_shadows, pairs),
+        leaks=_share(leaks, pairs),
+        false_shadows=_share(false_shadows, pairs),
+        light_wrong=_share(leaked + lost, light),
+        light_leaked=_share(leaked, light),
+        light_lost=_share(lost, light),
+    )
+
+
+def _share(parts: Array, wholes: Array) -> Share:
+    """sum(parts) / sum(wholes) and its standard error by the spread of the frames, those of a ratio estimator."""
+    whole, count = wholes.sum(), len(wholes)
+    if whole == 0:
+        return Share(None, None)
+    share = parts.sum() / whole
+    off = parts - share * wholes
+    return Share(float(share), float(np.sqrt(count / (count - 1) * (off**2).sum()) / whole))
+
+
+SHARES = {"mismatch": 17, "leaks": 8, "false_shadows": 15, "light_wrong": 17, "light_leaked": 14, "light_lost": 12}
+"""Fields of a row in the table, in per cent, and the widths of their columns."""
+WITH_ERROR = ("mismatch", "light_wrong")
+
+
+def heading(width: int) -> str:
+    """The table's first line; `width` is that of the longest scene's name."""
+    shares = [f"{name.replace('_', ' '):>{wide}}" for name, wide in SHARES.items()]
+    return f"{'scene':<{width}}  lights     projection    map      pairs{''.join(shares)}"
+
+
+def line(row: Row, width: int) -> str:
+    """A row as a line of the table."""
+    shares = [f"{_percent(getattr(row, name), error=name in WITH_ERROR):>{wide}}" for name, wide in SHARES.items()]
+    what = f"{row.scene:<{width}}  {row.lights:<9}  {row.projection:<11}"
+    return f"{what} {row.map_size:>5}  {row.pairs:>9,}{''.join(shares)}"
+
+
+def _percent(share: Share, *, error: bool) -> str:
+    if share.value is None or share.error is None:
+        return "-"
+    return f"{100 * share.value:.3f}" + (f" +-{100 * share.error:.3f}" if error else "")

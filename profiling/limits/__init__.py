@@ -1,0 +1,1 @@
+"""How far the passes are from what the machine could do."""

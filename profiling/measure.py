@@ -1,0 +1,75 @@
+"""What the measurements share: progress bars, a row of panels, and files that are the same for the same figures."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from deferred_ir.output.image import write_whole
+from deferred_ir.truth.path_tracer import Progress
+
+
+def arguments(doc: str | None, output: bool = True) -> argparse.ArgumentParser:
+    """A parser that takes scenes and, if it writes files, their folder; its help is the first line of `doc`."""
+    parser = argparse.ArgumentParser(description=(doc or "").splitlines()[0])
+    parser.add_argument("scenes", nargs="+", metavar="SCENE")
+    if output:
+        parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    return parser
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table."""
+    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows))
+
+
+@contextmanager
+def panels(names: Iterable[str], path: Path, y_label: str = "", share_y: bool = False) -> Iterator[list[Any]]:
+    """Matplotlib axes in a row, one for each name; written as SVG at the end, lines with a grid and a legend."""
+    import matplotlib as mpl
+
+    mpl.use("svg")
+    mpl.rcParams["svg.hashsalt"] = path.name
+    import matplotlib.pyplot as plt
+
+    titles = list(names)
+    figure, axes = plt.subplots(1, len(titles), figsize=(4.2 * len(titles), 3.8), sharey=share_y, squeeze=False)
+    yield list(axes[0])
+    for panel, title in zip(axes[0], titles, strict=True):
+        panel.set_title(title)
+        if panel.get_legend_handles_labels()[0]:
+            panel.grid(alpha=0.3)
+            panel.legend(fontsize=7)
+    axes[0][0].set_ylabel(y_label)
+    figure.tight_layout()
+    write_whole(path, lambda part: figure.savefig(part, format="svg", metadata={"Date": None}))
+    plt.close(figure)
+
+
+@contextmanager
+def bars() -> Iterator[Callable[[str], Progress]]:
+    """Progress bars on a terminal, one for each name that is given."""
+    from tqdm import tqdm
+
+    shown: list[Any] = []
+
+    def begin(name: str) -> Progress:
+        for bar in shown:
+            bar.close()
+        shown.append(tqdm(desc=name, disable=not sys.stderr.isatty(), file=sys.stderr))
+
+        def progress(done: int, total: int) -> None:
+            shown[-1].total = total
+            shown[-1].update(done - shown[-1].n)
+
+        return progress
+
+    try:
+        yield begin
+    finally:
+        for bar in shown:
+            bar.close()

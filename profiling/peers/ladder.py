@@ -1,0 +1,157 @@
+"""Peers on the ladder of 1, 2, 4, ... paths a pixel: time and error of each rung, kept on disk once it is measured."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import mean
+
+from deferred_ir.base.errors import Error, SettingError, did_you_mean
+from deferred_ir.profiling.peers import points as peer_points
+from deferred_ir.profiling.peers import process as peer_process
+from deferred_ir.profiling.peers.peer import NAMES
+from deferred_ir.profiling.peers.points import PeerKey, PeerPoint, Peers
+from deferred_ir.profiling.sweep.edge_mask import Mask
+from deferred_ir.profiling.sweep.equal_error import TARGETS
+from deferred_ir.profiling.sweep.reference import Truth
+from deferred_ir.scene.scene import Scene
+from deferred_ir.truth import metrics
+
+ENOUGH = min(TARGETS) / 1.5
+"""The ladder ends below this error: the least that is asked for lies between two rungs then."""
+BUDGET = 90e3
+"""Milliseconds of rendering that a peer has for all rungs; a rung that would go beyond is not begun."""
+QUICK = 5e3
+"""Milliseconds: a rung has all seeds if they are likely to take less together, else the first alone."""
+MOST_SPP = 1 << 14
+STALLED, STALLS = 0.95, 2
+"""The ladder also ends after so many rungs in a row with more than this part of the error of the one before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What all peers render and are held against. size: (width, height)."""
+
+    scene: Scene
+    size: tuple[int, int]
+    seeds: int
+    truth: Truth
+    mask: Mask
+
+    @property
+    def bounces(self) -> int:
+        """Of indirect light."""
+        return int(self.scene.render.set.get("vpl.bounces", 1))
+
+    def key(self, peer: str, spp: int, seed: int) -> PeerKey:
+        """What the point depends on."""
+        return PeerKey(self.scene.hash, list(self.size), self.bounces, peer, spp, seed)
+
+
+def chosen(text: str | None) -> Sequence[str]:
+    """The peers of `--peers A,B|none`, all without it; SettingError for a name that is none's."""
+    if text is None:
+        return NAMES
+    names = list(dict.fromkeys(name for part in text.split(",") if (name := part.strip())))
+    if names == ["none"]:
+        return ()
+    for name in names:
+        if name == "none":
+            raise SettingError(f"--peers {text}: 'none' stands alone; leave it out, or the others")
+        if name not in NAMES:
+            raise SettingError(f"--peers {text}: no peer '{name}'{did_you_mean(name, NAMES)}")
+    if not names:
+        raise SettingError("--peers: names nothing; write --peers none to leave them out")
+    return names
+
+
+def run(course: Course, folder: Path, names: Sequence[str]) -> Peers:
+    """Measure what is not in `folder` yet. A peer that is not there, or fails, gets a note, also on stderr."""
+    points: list[PeerPoint] = []
+    notes: dict[str, str] = {}
+    for name in names:
+        missing = peer_process.module(name).available()
+        if missing:
+            notes[name] = f"{missing}; pip install {peer_process.module(name).INSTALL}"
+        else:
+            try:
+                for point in _measured(course, folder, name):
+                    points.append(point)
+            except Error as error:
+                notes[name] = str(error)
+        if name in notes:
+            print(f"note: peer {name}: {notes[name]}", file=sys.stderr)
+    if names:
+        peer_points.save_notes(folder, notes)
+    return Peers(peer_points.ordered(points), notes)
+
+
+def _measured(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
+    """The rungs of one peer; its process starts at the first that is not on disk."""
+    from tqdm import tqdm
+
+    log = peer_points.make_folder(folder) / f"{name}.log"
+    style = "{desc} {percentage:3.0f}%|{bar}| {elapsed}{postfix}"
+    with (
+        ExitStack() as stack,
+        tqdm(total=BUDGET, bar_format=style, disable=not sys.stderr.isatty(), file=sys.stderr) as bar,
+    ):
+        process: peer_process.PeerProcess | None = None
+
+        def measure(spp: int, seed: int) -> PeerPoint:
+            nonlocal process
+            key = course.key(name, spp, seed)
+            point = peer_points.read(peer_points.path(folder, key))
+            if point is None or (point.reference, point.mask) != (course.truth.hash, course.mask.hash):
+                bar.set_description(f"{name}, {spp} paths, seed {seed}")
+                if process is None:
+                    made = peer_process.PeerProcess(name, course.scene, course.size, course.bounces, log)
+                    process = stack.enter_context(made)
+                point = _point(course, key, process)
+                peer_points.save(folder, point)
+            bar.update(min(point.ms, BUDGET - bar.n))
+            bar.set_postfix_str(f"at most {tqdm.format_interval((BUDGET - bar.n) / 1e3)} left")
+            return point
+
+        yield from climb(measure, course.seeds)
+
+
+def climb(measure: Callable[[int, int], PeerPoint], seeds: int) -> Iterator[PeerPoint]:
+    """Points by `measure(spp, seed)`, until the error is small enough, falls no longer, or the time is used up."""
+    spent, ahead, spp = 0.0, 0.0, 1
+    last, stalls = math.inf, 0
+    while spp <= MOST_SPP and spent + ahead <= BUDGET and stalls < STALLS:
+        rung = []
+        for seed in range(seeds if ahead * seeds <= QUICK else 1):
+            rung.append(measure(spp, seed))
+            yield rung[-1]
+        spent += sum(point.ms for point in rung)
+        ahead = 2 * mean(point.ms for point in rung)
+        errors = [point.relmse_masked for point in rung if point.relmse_masked is not None]
+        if not errors or mean(errors) <= ENOUGH:
+            return
+        stalls = stalls + 1 if mean(errors) > STALLED * last else 0
+        last = mean(errors)
+        spp *= 2
+
+
+def _point(course: Course, key: PeerKey, process: peer_process.PeerProcess) -> PeerPoint:
+    rendered = process.render(key.spp, key.seed)
+    image, truth = rendered.radiance, course.truth
+    trimmed, untrimmed = metrics.relmse(image, truth.radiance, truth.hit)
+    return PeerPoint(
+        key=key,
+        about=process.about,
+        reference=truth.hash,
+        reference_noise=truth.noise,
+        mask=course.mask.hash,
+        ms=round(rendered.ms, 4),
+        relmse=trimmed,
+        relmse_untrimmed=untrimmed,
+        bias=metrics.bias(image, truth.radiance, truth.hit),
+        relmse_masked=metrics.masked_relmse(image, truth.radiance, course.mask.kept),
+    )

@@ -1,0 +1,135 @@
+"""What was measured of peers, as files: one peer, number of paths a pixel and seed each; and why there is none."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+
+from deferred_ir.base.errors import OutputError
+from deferred_ir.profiling.peers.peer import NAMES
+from deferred_ir.report.run_json import write
+
+FOLDER = "peers"
+NOTES = "notes.json"
+
+
+@dataclass(frozen=True)
+class PeerKey:
+    """What a point depends on. size: [width, height]; spp: paths a pixel."""
+
+    scene_hash: str
+    size: list[int]
+    bounces: int
+    peer: str
+    spp: int
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """16 hex digits, the same on every machine."""
+        return hashlib.sha256(json.dumps(asdict(self), sort_keys=True).encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class PeerPoint:
+    """One image of a peer. about: its version; ms: wall time; reference, mask: hashes of what it was held against.
+
+    relmse, relmse_untrimmed and bias are over all pixels that show a surface, so they hold what a pixel's average and
+    its centre differ by; relmse_masked is over the pixels without an edge, None where none is left.
+    """
+
+    key: PeerKey
+    about: str
+    reference: str
+    reference_noise: float | None
+    mask: str
+    ms: float
+    relmse: float
+    relmse_untrimmed: float
+    bias: float
+    relmse_masked: float | None
+
+
+@dataclass(frozen=True)
+class Peers:
+    """Points by peer, paths and seed, and for peers of which points are missing the reason."""
+
+    points: Sequence[PeerPoint] = ()
+    notes: Mapping[str, str] = field(default_factory=dict)
+
+
+def path(folder: Path, key: PeerKey) -> Path:
+    """Where the point lies under the output folder."""
+    return folder / FOLDER / f"{key.name}.json"
+
+
+def save(folder: Path, point: PeerPoint) -> None:
+    """Write the point whole."""
+    write(path(folder, point.key), asdict(point))
+
+
+def read(file: Path) -> PeerPoint | None:
+    """The point in `file`, None if it is missing, half-written, or not what its name says."""
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+        if data.keys() != {f.name for f in fields(PeerPoint)} or not data["ms"] > 0:
+            return None
+        point = PeerPoint(**{**data, "key": PeerKey(**data["key"])})
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return None  # it is measured again
+    return point if point.key.name == file.stem else None
+
+
+def make_folder(folder: Path) -> Path:
+    """The folder for peers' points, created if need be; OutputError if it cannot be."""
+    try:
+        (folder / FOLDER).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder / FOLDER}: cannot be written: {error.strerror}; choose another folder") from error
+    return folder / FOLDER
+
+
+def save_notes(folder: Path, notes: Mapping[str, str]) -> None:
+    """Keep the notes for the report of a merge."""
+    write(make_folder(folder) / NOTES, dict(notes))
+
+
+def merge(
+    sources: Sequence[Path], target: Path, *, scene_hash: str, size: Sequence[int], reference: str
+) -> tuple[Peers, int]:
+    """Copy what folders hold of peers to `target`, and how many files were unusable or of something else."""
+    points: dict[str, PeerPoint] = {}
+    notes: dict[str, str] = {}
+    broken = 0
+    for source in sources:
+        for file in sorted((source / FOLDER).glob("*.json")):
+            if file.name == NOTES:
+                notes = {**_notes(file), **notes}
+                continue
+            point = read(file)
+            wanted = scene_hash, list(size), reference
+            if point and (point.key.scene_hash, list(point.key.size), point.reference) == wanted:
+                points.setdefault(point.key.name, point)
+            else:
+                broken += 1
+    if points or notes:
+        save_notes(target, notes)
+    for point in points.values():
+        save(target, point)
+    return Peers(ordered(points.values()), notes), broken
+
+
+def _notes(file: Path) -> dict[str, str]:
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}  # a note alone, and the next run writes it again
+    return {name: str(data[name]) for name in NAMES if name in data} if isinstance(data, dict) else {}
+
+
+def ordered(points: Iterable[PeerPoint]) -> list[PeerPoint]:
+    """By peer, paths and seed."""
+    return sorted(points, key=lambda point: (NAMES.index(point.key.peer), point.key.spp, point.key.seed))

@@ -1,0 +1,131 @@
+"""The tables of a sweep: a row a point, of peers too, the time of each pass, and a trace."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from statistics import median, quantiles
+from typing import Any
+
+from deferred_ir.output.image import write_whole
+from deferred_ir.profiling.peers.points import PeerPoint
+from deferred_ir.profiling.sweep.groups import flagged, noisy
+from deferred_ir.profiling.sweep.points import Point
+
+NOISY = "reference_noise"
+
+
+def row(point: Point) -> dict[str, Any]:
+    """A point of ours as a row."""
+    return {
+        "graph": point.graph,
+        "vpls": point.key.vpls,
+        "seed": point.key.seed,
+        "frame_ms": point.frame_ms,
+        "relmse": point.relmse,
+        "relmse_untrimmed": point.relmse_untrimmed,
+        "bias": point.bias,
+        "flip": point.flip,
+        "memory": sum(point.memory.values()),
+        "flagged": NOISY if flagged(point) else "",
+        "vpls_alive": point.vpls_alive,
+        "scene_hash": point.key.scene_hash,
+        "graph_hash": point.key.graph_hash,
+        "device": point.device,
+        "relmse_masked": point.relmse_masked,
+        "spp": None,
+    }
+
+
+def peer_row(point: PeerPoint) -> dict[str, Any]:
+    """A point of a peer as a row with the same columns: its name is the graph, its version the device."""
+    doubtful = point.relmse_masked is not None and noisy(point.reference_noise, point.relmse_masked)
+    return {
+        "graph": point.key.peer,
+        "vpls": None,
+        "seed": point.key.seed,
+        "frame_ms": point.ms,
+        "relmse": point.relmse,
+        "relmse_untrimmed": point.relmse_untrimmed,
+        "bias": point.bias,
+        "flip": None,
+        "memory": None,
+        "flagged": NOISY if doubtful else "",
+        "vpls_alive": None,
+        "scene_hash": point.key.scene_hash,
+        "graph_hash": None,
+        "device": point.about,
+        "relmse_masked": point.relmse_masked,
+        "spp": point.key.spp,
+    }
+
+
+def pass_rows(found: Iterable[Point]) -> list[dict[str, Any]]:
+    """Quartiles of each pass over frames and seeds, of their sum in a frame, and of the wall time of whole frames."""
+    times: dict[tuple[str, int], dict[str, list[tuple[float, float]]]] = {}
+    walls: dict[tuple[str, int], list[float]] = {}
+    for point in found:
+        group = point.graph, point.key.vpls
+        walls.setdefault(group, []).extend(point.frames)
+        passes = times.setdefault(group, {})
+        for laps in point.laps:
+            for name, gpu, cpu in laps:
+                passes.setdefault(name, []).append((gpu, cpu))
+            whole = sum(gpu for _, gpu, _ in laps), sum(cpu for _, _, cpu in laps)
+            passes.setdefault("(sum)", []).append(whole)
+    rows = []
+    for (graph, vpls), passes in times.items():
+        order = sorted(passes, key=lambda name: name == "(sum)")
+        columns = {name: _quartiles("gpu_ms", [gpu for gpu, _ in passes[name]]) for name in order}
+        for name in order:
+            columns[name] |= _quartiles("cpu_ms", [cpu for _, cpu in passes[name]])
+            rows.append({"graph": graph, "vpls": vpls, "pass": name, **columns[name]})
+        no_gpu = dict.fromkeys(name for name in columns["(sum)"] if name.startswith("gpu_ms"))
+        wall = _quartiles("cpu_ms", walls[graph, vpls])
+        rows.append({"graph": graph, "vpls": vpls, "pass": "(frame)", **no_gpu, **wall})
+    return rows
+
+
+def _quartiles(name: str, values: Sequence[float]) -> dict[str, float]:
+    low, _, high = quantiles(values, n=4, method="inclusive") if len(values) > 1 else [*values] * 3
+    return {f"{name}_q1": round(low, 4), f"{name}_median": round(median(values), 4), f"{name}_q3": round(high, 4)}
+
+
+def trace(found: Sequence[Point]) -> dict[str, Any]:
+    """Chrome trace events: of each graph one frame, that of the first seed with the most VPLs; CPU and GPU tracks."""
+    events: list[dict[str, Any]] = []
+    best = {point.graph: point for point in sorted(found, key=lambda point: (point.key.vpls, -point.key.seed))}
+    for process, (graph, point) in enumerate(best.items(), start=1):
+        middle = min(range(len(point.frames)), key=lambda i: abs(point.frames[i] - point.frame_ms))
+        title = f"{graph}, {point.key.vpls} VPLs"
+        events.append({"ph": "M", "pid": process, "tid": 0, "name": "process_name", "args": {"name": title}})
+        laps = point.laps[middle]
+        tracks = {"GPU": [(name, gpu) for name, gpu, _ in laps], "CPU": [(name, cpu) for name, _, cpu in laps]}
+        for thread, (track, spans) in enumerate(tracks.items(), start=1):
+            events.append({"ph": "M", "pid": process, "tid": thread, "name": "thread_name", "args": {"name": track}})
+            start = 0.0
+            for label, ms in spans:
+                when = {"ts": round(1e3 * start, 1), "dur": round(1e3 * ms, 1)}
+                events.append({"ph": "X", "pid": process, "tid": thread, "name": label, "cat": "pass", **when})
+                start += ms
+    return {"traceEvents": events, "displayTimeUnit": "ms"}
+
+
+def write_csv(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows with the columns of the first, at least one."""
+    out = io.StringIO()
+    writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    write_text(file, out.getvalue())
+
+
+def write_text(file: Path, text: str) -> None:
+    """Write UTF-8 whole or not at all."""
+
+    def fill(part: Path) -> None:
+        part.write_text(text, encoding="utf-8")
+
+    write_whole(file, fill)

@@ -1,0 +1,1 @@
+"""Studies that the pages of docs quote, one a file."""

@@ -1,0 +1,1 @@
+"""Error against run time: many renders, their errors and times, resumed and merged."""

@@ -1,0 +1,180 @@
+"""Pixels in which something ends: left out where renderers are compared that do not agree on what a pixel is.
+
+A pixel is the radiance at its centre here, and the mean over its area for path tracers. Both are the same as long as
+nothing within the pixel jumps: so rays go through a lattice over each pixel, its border included, and where two
+neighbours of the lattice differ in surface, albedo or light the pixel does not count, for anyone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Bools
+from deferred_ir.base.errors import SettingError
+from deferred_ir.output.image import Image, write_whole
+from deferred_ir.output.read import read_record, record_path
+from deferred_ir.rays.tracer import Tracer
+from deferred_ir.report.run_json import write
+from deferred_ir.scene.scene import Scene
+from deferred_ir.truth.path_tracer import Progress
+
+FILE, PICTURE = "mask.npy", "mask.png"
+STEPS = 4
+"""Steps of the lattice along a pixel's edge."""
+BEND = np.radians(6.0)
+"""Largest angle between neighbours' normals, and of the way from one to the other with their planes, on one surface."""
+JUMP = 0.05
+"""Largest difference of neighbours' albedo, as a part of the larger one."""
+ROWS = 16
+"""Rows of pixels at once, for memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mask:
+    """kept: bool (H, W), top row first, the pixels that count: all of such a pixel is one lit or one unlit surface."""
+
+    kept: Bools
+
+    @property
+    def left_out(self) -> float:
+        """The share of the pixels that does not count."""
+        return 1.0 - float(self.kept.mean())
+
+    @property
+    def hash(self) -> str:
+        """First 16 hex digits of SHA-256 over the pixels."""
+        return hashlib.sha256(np.packbits(self.kept).tobytes()).hexdigest()[:16]
+
+
+@dataclass(frozen=True, eq=False)
+class _Lattice:
+    """What rays through a lattice meet, all (rows, columns, ...): position, geometric and shading normal, albedo.
+
+    material: -1 where there is nothing. lit: the spotlight reaches the point.
+    """
+
+    position: Array
+    normal: Array
+    shading: Array
+    albedo: Array
+    material: Any
+    lit: Bools
+
+    def part(self, rows: slice, columns: slice) -> _Lattice:
+        return _Lattice(*(value[rows, columns] for value in vars(self).values()))
+
+
+def found(scene: Scene, size: tuple[int, int], progress: Progress | None = None) -> Mask:
+    """The mask of `scene` at time 0 for images of `size` (width, height). DeviceError without embreex."""
+    scene = scene.at(0.0)
+    tracer = Tracer(scene)
+    blocks = []
+    for row in range(0, size[1], ROWS):
+        blocks.append(_kept(_seen(scene, tracer, size, row, min(row + ROWS, size[1]))))
+        if progress:
+            progress(min(row + ROWS, size[1]), size[1])
+    return Mask(np.concatenate(blocks))
+
+
+def _seen(scene: Scene, tracer: Tracer, size: tuple[int, int], first: int, last: int) -> _Lattice:
+    """The lattice over the rows of pixels `first` to `last` - 1."""
+    width, height = size
+    a, b, c = scene.camera.ray_axes(size)
+    x = np.arange(STEPS * width + 1) / (STEPS * width) * 2 - 1
+    y = 1 - np.arange(STEPS * first, STEPS * last + 1) / (STEPS * height) * 2
+    shape = len(y), len(x)
+    directions = (x[None, :, None] * a + y[:, None, None] * b + c).reshape(-1, 3)
+    hits = tracer.closest(np.broadcast_to(np.asarray(scene.camera.position, float), directions.shape), directions)
+    material = np.where(hits.hit, scene.geometry.face_materials[hits.face], -1)
+
+    light = scene.spotlight
+    to_light = np.asarray(light.position, float) - hits.position
+    to_light /= np.maximum(np.linalg.norm(to_light, axis=1, keepdims=True), 1e-150)
+    lit = hits.hit & (np.einsum("ij,ij->i", to_light, hits.normal) > 0) & (light.cone(-to_light) > 0)
+    rows = np.flatnonzero(lit)
+    sources = np.broadcast_to(np.asarray(light.position, float), (len(rows), 3))
+    lit[rows] = ~tracer.occluded(tracer.lift(hits.position[rows], hits.normal[rows]), sources)
+    values: tuple[Any, ...] = (hits.position, hits.normal, hits.shading_normal, hits.albedo, material, lit)
+    return _Lattice(*(value.reshape(*shape, *value.shape[1:]) for value in values))
+
+
+def _kept(lattice: _Lattice) -> Bools:
+    """The pixels of these rows that count."""
+    everything = slice(None)
+    across = _differ(lattice.part(everything, slice(-1)), lattice.part(everything, slice(1, None)))
+    down = _differ(lattice.part(slice(-1), everything), lattice.part(slice(1, None), everything))
+    nothing = lattice.material < 0
+    # Steps along and between the lines of a pixel's lattice; those on its border are its neighbour's, too.
+    edges = _any(across, STEPS + 1, STEPS) | _any(down, STEPS, STEPS + 1) | _any(nothing, STEPS + 1, STEPS + 1)
+    return ~edges
+
+
+def _any(flags: Bools, tall: int, wide: int) -> Bools:
+    """Whether any of the `tall` x `wide` flags of a pixel is set, pixels being STEPS apart."""
+    blocks: Any = np.lib.stride_tricks.sliding_window_view(flags, (tall, wide))[::STEPS, ::STEPS]
+    result: Bools = blocks.any(axis=(-1, -2))
+    return result
+
+
+def _differ(one: _Lattice, other: _Lattice) -> Bools:
+    """Where something lies between two points of the lattice."""
+    way = other.position - one.position
+    length = np.linalg.norm(way, axis=-1)
+    off_plane = np.maximum(np.abs((way * one.normal).sum(-1)), np.abs((way * other.normal).sum(-1)))
+    bent = (one.shading * other.shading).sum(-1) < np.cos(BEND)
+    folded = (one.normal * other.normal).sum(-1) < np.cos(BEND)
+    jump = np.abs(one.albedo - other.albedo) > JUMP * np.maximum(one.albedo, other.albedo)
+    differ: Bools = (
+        (one.material != other.material)
+        | (one.lit != other.lit)
+        | jump.any(axis=-1)
+        | bent
+        | folded
+        | (off_plane > np.sin(BEND) * length)
+    )
+    return differ
+
+
+def made(folder: Path, scene: Scene, size: tuple[int, int], progress: Callable[[], Progress]) -> Mask:
+    """The mask kept in `folder`, or a new one, kept there."""
+    mask = read(folder, scene.hash, size)
+    if mask is None:
+        mask = found(scene, size, progress())
+        save(folder, mask, scene.hash)
+    return mask
+
+
+def save(folder: Path, mask: Mask, scene_hash: str) -> None:
+    """Write the mask, its picture (white: counts) and what it belongs to; each file appears whole or not at all."""
+    height, width = mask.kept.shape
+    record = {"scene_hash": scene_hash, "size": [width, height], "left_out": mask.left_out, "image_hash": mask.hash}
+    Image(None, np.repeat(np.where(mask.kept, 255, 0).astype(np.uint8)[..., None], 3, axis=2)).save(folder / PICTURE)
+
+    def fill(part: Path) -> None:
+        with part.open("wb") as file:
+            np.save(file, mask.kept)
+        write(record_path(folder / FILE), record)
+
+    write_whole(folder / FILE, fill)
+
+
+def read(folder: Path, scene_hash: str, size: tuple[int, int]) -> Mask | None:
+    """What an earlier run left, if it is whole and of this scene and size."""
+    file = folder / FILE
+    try:
+        with file.open("rb") as stream:
+            kept = np.load(stream)
+        record = read_record(file, size)
+    except (OSError, ValueError, EOFError, SettingError):
+        return None  # it is made again
+    if kept.dtype != np.bool_ or kept.shape != (size[1], size[0]) or not (folder / PICTURE).is_file():
+        return None
+    mask = Mask(kept)
+    whole = record.get("scene_hash") == scene_hash and record.get("image_hash") == mask.hash
+    return mask if whole else None

@@ -1,1 +1,0 @@
-"""GLSL shared by writers and readers."""

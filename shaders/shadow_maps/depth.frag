@@ -1,0 +1,6 @@
+// Depth alone.
+#include "lib/camera/frame.glsl"
+
+void main() {
+    WRITE_DEPTH(frame.near);
+}

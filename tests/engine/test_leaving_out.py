@@ -1,0 +1,252 @@
+"""What a scene or a view does not need is left out, and no pixel is another for it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from small_scenes import build, crooked_room, plane, quad, room
+from test_moving_models import two
+
+from deferred_ir.cli import main
+from deferred_ir.frame.pass_io import FullscreenPass
+from deferred_ir.frame.screen_tiles import Tiles
+from deferred_ir.gl.textures import GpuTexture
+from deferred_ir.graph.graph import Input, Output, Texture
+from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.spot import Spotlight
+
+SIZE = (48, 48)
+DARK = (0.0, 0.0, 0.0)
+
+
+def gable():
+    """A roof below the light: the camera looks at one side and at what that faces; the other side faces away."""
+    return build(
+        quad((-1, -1, 1), (0, 0, 1), (0, 0, -1), (0.7, 0.2, 0.1)),
+        quad((0.3, -0.3, 1), (2.5, -2.5, 1), (2.5, -2.5, -1)),
+        quad((4, -4, 4), (4, 2, 4), (4, 2, -4), (0.2, 0.3, 0.8)),
+        camera=Camera((1, 1, 0.2), (2.5, -1.5, 0), fov=60.0),
+        spotlight=Spotlight((0.1, 1.6, 0.1), (0.1, -1.0, 0.0), 100.0, (3.0, 2.5, 2.0)),
+    )
+
+
+def both(renderer, scene, graph, *, vpls=None, size=SIZE, **settings):
+    """The frame as it is and with all that another scene would need, each with its counters and its plan."""
+    result = []
+    for keep_all in (False, True):
+        one = renderer(size, graph, set=settings, keep_all=keep_all)
+        image = one.render(scene, vpls=vpls)
+        result.append((image, dict(one.executor.counters), one.plan(scene, vpls)))
+    return result
+
+
+def same(one, other):
+    return np.array_equal(one.radiance, other.radiance) and np.array_equal(one.display, other.display)
+
+
+GRAPHS = [
+    ("deferred", {}),
+    ("hemisphere", {}),
+    ("interleaved", {}),
+    ("accurate", {"shadow_rays.visibility": "rays"}),
+    ("accurate", {"shadow_rays.visibility": "maps"}),
+    ("forward", {"forward.lights_per_draw": 3}),
+    ("forward", {"forward.lights_per_draw": 1}),
+]
+
+
+@pytest.mark.parametrize(("graph", "settings"), GRAPHS)
+def test_lights_that_light_nothing_in_view_get_no_map(renderer, graph, settings):
+    (image, counters, _), (full, kept, _) = both(renderer, gable(), graph, vpls=64, **settings)
+    assert image.radiance.any()
+    assert same(image, full)
+    assert 5 < counters["lights_dropped"] < 40
+    assert "lights_dropped" not in kept
+    assert counters["vpls_alive"] == kept["vpls_alive"]
+    if "maps_drawn" in kept:
+        assert counters["maps_drawn"] == kept["maps_drawn"] - counters["lights_dropped"]
+
+
+@pytest.mark.parametrize("graph", ["deferred", "interleaved"])
+def test_many_lights_are_added_up_in_the_same_blocks_without_those_that_are_dropped(renderer, graph):
+    (image, counters, _), (full, _, _) = both(
+        renderer, gable(), graph, vpls=500, **{"shadow_maps.vpl_size": 16, "vpl.pattern": "random"}
+    )
+    assert counters["lights_dropped"] > 50
+    assert same(image, full)
+
+
+def test_a_spotlight_that_shines_where_nobody_looks_gets_no_map(renderer):
+    scene = gable()
+    away = replace(
+        scene, spotlight=replace(scene.spotlight, position=(-0.7, 3.0, 0.0), look_at=(-0.7, 0.0, 0.0), fov=10)
+    )
+    (image, counters, _), (full, kept, _) = both(renderer, away, "deferred", vpls=16)
+    assert counters["maps_drawn"] == 0
+    assert kept["maps_drawn"] == 1 + kept["vpls_alive"] > 1
+    assert same(image, full)
+
+
+def test_the_plan_of_a_frame_says_which_lights_have_no_map(renderer):
+    one = renderer(SIZE)
+    one.render(gable(), vpls=16)
+    step = next(step for step in one.plan(gable(), 16).steps if step.name == "shadow_maps")
+    parts = step.work.subpasses(step.descriptions, one.executor.ports(step))
+    out = [part for part in parts if part["state"] == "left out"]
+    assert len(out) == one.executor.counters["lights_dropped"]
+    assert out[0]["why"] == "it lights nothing that is seen"
+
+
+@pytest.mark.parametrize("graph", ["deferred", "interleaved", "accurate", "forward", "incremental"])
+def test_without_vpls_nothing_is_cast_shared_or_filtered(renderer, graph):
+    one = renderer(SIZE, graph)
+    image = one.render(room(), vpls=0)
+    assert one._tracer is None or graph == "accurate"
+    plan = one.plan(room(), 0)
+    assert not {"light_shares", "gather", "near_field", "thin_rays"} & {step.name for step in plan.steps}
+    full = renderer(SIZE, graph, keep_all=True)
+    assert same(image, full.render(room(), vpls=0))
+    if graph != "forward":
+        assert one.executor.counters["maps_drawn"] in (0, 1)
+    kept = full.plan(room(), 0)
+    assert set(kept.left_out) <= {"shadow_rays", "thin_rays", "shadow_maps", "interleave"}
+
+
+@pytest.mark.parametrize("graph", ["deferred", "interleaved", "accurate", "forward"])
+def test_without_light_there_are_no_maps_and_no_rays(renderer, graph):
+    scene = replace(room(), spotlight=replace(room().spotlight, emission=DARK))
+    (image, counters, plan), (full, _, kept) = both(renderer, scene, graph, vpls=8)
+    assert same(image, full)
+    assert not image.radiance.any()
+    assert "shadow_maps" in plan.left_out
+    assert plan.left_out.keys() > kept.left_out.keys()
+    assert counters.get("maps_drawn", 0) == 0
+
+
+def test_a_target_that_nothing_reads_is_not_written(renderer, tmp_path):
+    path = tmp_path / "flat.toml"
+    path.write_text(
+        'extends = "deferred"\n[outputs]\ndisplay = "flat.color"\n[passes.flat]\ninputs = { depth = "gbuffer.depth" }\n'
+    )
+    (tmp_path / "flat.frag").write_text(
+        "layout(binding = UNIT_DEPTH) uniform sampler2D depth;\nlayout(location = 0) out vec4 color;\n"
+        "void main() { color = vec4(sign(texelFetch(depth, ivec2(gl_FragCoord.xy), 0).r)); }\n"
+    )
+
+    class Flat(FullscreenPass):
+        inputs: ClassVar = {"depth": Input("depth", "depth32f")}
+        fragment = "flat.frag"
+        shader_folder = tmp_path
+
+        def outputs(self, inputs):
+            del inputs
+            return {"color": Output("grey", Texture("rgba8"))}
+
+    pictures = {}
+    for keep_all in (False, True):
+        one = renderer(SIZE, path, passes={"flat": Flat}, keep_all=keep_all)
+        plan = one.plan(room(), outputs=["display"])
+        one.draw(room(), plan)
+        pictures[keep_all] = one.read(plan).display, one.memory()["textures"], plan
+    (slim, few, plan), (full, more, kept) = pictures[False], pictures[True]
+    assert np.array_equal(slim, full)
+    assert slim.any()
+    assert {"gbuffer.albedo", "gbuffer.normals"} <= plan.left_out.keys()
+    assert plan.left_out["gbuffer.albedo"] == "nothing reads it"
+    assert few == more - 2 * 8 * SIZE[0] * SIZE[1]
+    assert "gbuffer.albedo" not in kept.left_out
+
+
+def atlas(one):
+    return one.executor.resource(("shadow_maps", "atlas"))
+
+
+def test_the_atlas_has_room_for_the_lights_that_live(renderer, monkeypatch):
+    made = []
+    allocate = GpuTexture._allocate
+    monkeypatch.setattr(GpuTexture, "_allocate", lambda self, layers: (made.append(layers), allocate(self, layers)))
+    settings = {"shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 16}
+    half = replace(gable(), spotlight=replace(gable().spotlight, position=(0.1, 1.6, 1.0), look_at=(0.1, -1.0, 1.0)))
+    one = renderer(SIZE, set=settings)
+    image = one.render(half, vpls=256)
+    lights = one.executor.resource(("vpl", "lights")).records
+    tiles = lights["tile"][lights["emission"].any(axis=1)].max() + 1
+    assert 16 < tiles < 200
+    assert atlas(one).layers == 1 + -(-tiles // 16) < 17
+    full = renderer(SIZE, set=settings, keep_all=True)
+    assert same(image, full.render(half, vpls=256))
+    assert atlas(full).layers == 17
+    made.clear()
+    for seed in range(1, 7):
+        one.render(half, vpls=256, seed=seed)
+    assert len(made) <= 2
+    one.render(room(), vpls=256)
+    assert atlas(one).layers == 17
+
+
+def test_transient_targets_share_textures_and_the_pixels_are_the_same(renderer):
+    for graph in ("interleaved", "accurate"):
+        settings = {"shadow_rays.visibility": "rays"} if graph == "accurate" else {}
+        one, full = (renderer(SIZE, graph, set=settings, keep_all=keep_all) for keep_all in (False, True))
+        images = [r.render(room(), vpls=16, seed=seed) for r in (one, full) for seed in (0, 1)]
+        assert same(images[0], images[2])
+        assert same(images[1], images[3])
+        plan = one.plan(room(), 16)
+        assert len(plan.tenants()) == 1
+        spared = full.executor.memory()["textures"] - one.executor.memory()["textures"]
+        assert spared == 16 * SIZE[0] * SIZE[1]
+        source = next(iter(plan.tenants().values()))
+        with pytest.raises(KeyError, match="another pass has its texture by now; make it an output"):
+            one.executor.resource(source)
+        assert one.render(room(), vpls=16, accumulate=2).radiance.tobytes() == (
+            full.render(room(), vpls=16, accumulate=2).radiance.tobytes()
+        )
+
+
+def test_no_texture_is_shared_where_frames_are_reused(renderer):
+    one = renderer(SIZE, "interleaved", reuse=True)
+    one.render(room(), vpls=16)
+    assert one.executor.resource(("light_shares", "shares")) is not one.executor.resource(("lighting", "radiance"))
+
+
+def test_the_command_line_can_keep_all(tmp_path):
+    images = []
+    for options in ([], ["--keep-all"]):
+        path, run = tmp_path / f"{len(options)}.npy", tmp_path / f"{len(options)}.json"
+        command = ["render", "cornell", "--size", "24x16", "--vpls", "4", "--device", "software"]
+        assert main.main([*command, "-o", str(path), "--json", str(run), *options]) == 0
+        made = json.loads(run.read_text())
+        images.append((np.load(path), [entry["name"] for entry in made["passes"]], made["memory_bytes"]["textures"]))
+    (slim, few, _), (full, more, _) = images
+    assert np.array_equal(slim, full)
+    assert [*few, "tonemap"] == more
+
+
+@pytest.mark.parametrize(("graph", "size", "vpls"), [("deferred", (150, 90), 40), ("hemisphere", (70, 130), 260)])
+def test_tiles_of_the_screen_skip_lights_that_they_lie_behind(renderer, graph, size, vpls):
+    scene = crooked_room()
+    settings = {"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}
+    (image, counters, _), (full, kept, _) = both(renderer, scene, graph, vpls=vpls, size=size, **settings)
+    assert counters["lights_skipped"] > 5
+    assert "lights_skipped" not in kept
+    assert same(image, full)
+
+
+def test_tiles_that_show_nothing_are_not_drawn(renderer):
+    scene = build(plane(), camera=Camera((0.0, 3.0, 0.1), (2.0, 0.0, 0.0), fov=70.0))
+    (image, _, _), (full, _, _) = both(renderer, scene, "deferred", vpls=16, size=(192, 192))
+    assert same(image, full)
+    camera = Tiles.of(np.where(np.arange(192) > 100, 0.5, 0.0)[None].repeat(192, axis=0), scene.camera, 0.1)
+    assert sorted(set(camera.rectangles[:, 0].tolist())) == [64, 128]
+
+
+@pytest.mark.parametrize("graph", ["deferred", "interleaved"])
+def test_nothing_is_missing_when_models_move(renderer, graph):
+    scene, ways = two(), [renderer((96, 70), graph, keep_all=keep_all) for keep_all in (False, True)]
+    for time in (0.0, 0.7, 0.2):
+        images = [one.render(scene, vpls=24, time=time) for one in ways]
+        assert same(*images)

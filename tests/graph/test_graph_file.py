@@ -1,0 +1,343 @@
+"""Graph files: the built-in ones, `extends`, settings, and every way in which a file can be wrong."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from test_scene_file import toml
+
+from deferred_ir.base.errors import GraphError
+from deferred_ir.graph import file
+from deferred_ir.graph.compile import compile
+from deferred_ir.graph.file import graph_hash, graph_names, load_graph
+from deferred_ir.graph.graph import Facts, Input, Output, Pass, Texture
+from deferred_ir.graph.params import param, specs
+
+SMALL = """
+[outputs]
+image = "end.out"
+[passes.start]
+type = "blur"
+[passes.end]
+type = "blur"
+inputs = { image = "start.out" }
+"""
+
+
+@dataclass(frozen=True)
+class Params:
+    radius: float = param(1.0, lo=0.0, hi=9.0, doc="Radius.")
+    steps: int = param(3, lo=1, doc="Steps.")
+
+
+class Blur(Pass):
+    """A pass of the user's own."""
+
+    Params = Params
+    inputs = {"image": Input("image", optional=True)}  # noqa: RUF012
+
+    def outputs(self, inputs):
+        return {"out": Output("", Texture("rgba8"))}
+
+
+OWN = {"blur": Blur}
+
+
+def write(folder: Path, text: str, name: str = "own.toml") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def fault(
+    folder: Path, text: str, chosen: Mapping[str, Any] | None = None, passes: Mapping[str, type[Pass]] | None = OWN
+) -> str:
+    """The message of the error, which must be one line that begins with the file's name."""
+    path = write(folder, text)
+    with pytest.raises(GraphError) as raised:
+        load_graph(path, chosen, passes)
+    message = str(raised.value)
+    assert message.startswith("own.toml: ")
+    assert "\n" not in message
+    return message.removeprefix("own.toml: ")
+
+
+# Built-in graphs and passes
+
+
+def test_the_graphs_of_the_contract_are_there():
+    assert {"deferred", "forward"} <= set(graph_names())
+
+
+@pytest.mark.parametrize("name", graph_names())
+@pytest.mark.parametrize("emits", [True, False])
+def test_every_built_in_graph_loads_and_compiles(name, emits):
+    graph = load_graph(name)
+    assert {"radiance", "display"} <= set(graph.outputs)
+    plan = compile(graph, list(graph.outputs), Facts(emits=emits))
+    assert {step.name for step in plan.steps} | set(plan.left_out) == set(graph.nodes)
+
+
+@pytest.mark.parametrize("name", graph_names())
+def test_every_built_in_graph_says_what_it_is(name):
+    first = (Path(file._graphs_folder()) / f"{name}.toml").read_text().splitlines()[0]
+    assert first.startswith("# ")
+
+
+@pytest.mark.parametrize("name", file.pass_types())
+def test_every_pass_parameter_and_port_is_documented(name):
+    work = importlib.import_module(f"{file.PASSES}.{name}").PASS
+    assert issubclass(work, Pass)
+    assert work.__doc__
+    assert all(spec.doc.strip().endswith(".") for spec in specs(work.Params).values())
+    assert all(spec.fault(spec.default) is None for spec in specs(work.Params).values())
+    assert all(port.doc for port in work.inputs.values())
+
+
+@pytest.mark.parametrize("name", graph_names())
+def test_every_output_is_documented(name):
+    plan = compile(load_graph(name), list(load_graph(name).outputs))
+    assert all(output.doc for step in plan.steps for output in step.outputs.values())
+
+
+# Files
+
+
+def test_a_file_becomes_a_graph(tmp_path):
+    graph = load_graph(
+        write(tmp_path, SMALL.replace('type = "blur"\ninputs', 'type = "blur"\nsteps = 5\ninputs')), {}, OWN
+    )
+    assert set(graph.nodes) == {"start", "end"}
+    assert isinstance(graph.nodes["end"].work, Blur)
+    assert graph.nodes["end"].work.params == Params(steps=5)
+    assert graph.nodes["end"].inputs == {"image": "start.out"}
+    assert graph.outputs == {"image": "end.out"}
+    assert graph.origin == "own.toml"
+
+
+def test_a_pass_of_ones_own_wins_over_a_built_in_of_its_name(tmp_path):
+    text = '[outputs]\nimage = "tonemap.out"\n[passes.tonemap]\nsteps = 2\n'
+    assert isinstance(load_graph(write(tmp_path, text), {}, {"tonemap": Blur}).nodes["tonemap"].work, Blur)
+
+
+def test_extends_overlays_table_by_table(tmp_path):
+    write(tmp_path, SMALL, "base.toml")
+    text = 'extends = "base.toml"\n[outputs]\nfirst = "start.out"\n[passes]\nend.radius = 2\nmore.type = "blur"\n'
+    graph = load_graph(write(tmp_path, text), {}, OWN)
+    assert graph.outputs == {"image": "end.out", "first": "start.out"}
+    assert graph.nodes["end"].inputs == {"image": "start.out"}
+    assert graph.nodes["end"].work.params == Params(radius=2.0)
+    assert set(graph.nodes) == {"start", "end", "more"}
+
+
+def test_extends_a_built_in_graph_and_a_chain_of_files_in_another_folder(tmp_path):
+    (tmp_path / "sub").mkdir()
+    write(tmp_path / "sub", 'extends = "deferred"\n[passes.vpl]\ncount = 5\nfov = 90\n', "one.toml")
+    path = write(tmp_path, 'extends = "sub/one.toml"\n[passes.vpl]\ncount = 7\n')
+    graph = load_graph(path)
+    assert (graph.nodes["vpl"].work.params.count, graph.nodes["vpl"].work.params.fov) == (7, 90.0)
+    assert set(graph.nodes) == set(load_graph("deferred").nodes)
+
+
+def test_false_cuts_wires_and_outputs_of_the_extended_graph(tmp_path):
+    text = 'extends = "deferred"\n[outputs]\ndisplay = false\n[passes]\nshadow_maps = false\ntonemap = false\n'
+    graph = load_graph(write(tmp_path, text + "lighting.inputs = { shadows = false, blockers = false }\n"))
+    plan = compile(graph, list(graph.outputs))
+    assert [step.name for step in plan.steps] == ["vpl", "gbuffer", "lighting"]
+    assert plan.steps[-1].sources["shadows"] is None
+
+
+def test_extends_does_not_change_the_graph_it_extends(tmp_path):
+    before = graph_hash(load_graph("deferred"))
+    load_graph(write(tmp_path, 'extends = "deferred"\n[passes.vpl]\ncount = 5\n'))
+    assert graph_hash(load_graph("deferred")) == before
+
+
+def test_false_removes_a_pass(tmp_path):
+    write(tmp_path, SMALL, "base.toml")
+    text = 'extends = "base.toml"\n[outputs]\nimage = "start.out"\n[passes]\nend = false\n'
+    assert set(load_graph(write(tmp_path, text), {}, OWN).nodes) == {"start"}
+
+
+def test_a_removed_pass_must_be_there(tmp_path):
+    write(tmp_path, SMALL, "base.toml")
+    assert fault(tmp_path, 'extends = "base.toml"\n[passes]\nebd = false\n') == (
+        "passes.ebd: nothing to remove; did you mean 'end'?"
+    )
+
+
+def test_nothing_can_be_removed_without_a_base(tmp_path):
+    assert "passes.end: wants a table" in fault(tmp_path, "[passes]\nend = false\n")
+
+
+@pytest.mark.parametrize("chain", [["own.toml"], ["a.toml", "own.toml"], ["a.toml", "b.toml", "a.toml"]])
+def test_a_file_that_extends_itself_is_told(tmp_path, chain):
+    names = ["own.toml", *chain]
+    for name, base in zip(names, chain, strict=False):
+        write(tmp_path, f'extends = "{base}"\n{SMALL}', name)
+    with pytest.raises(GraphError, match=r"extends itself; remove 'extends'"):
+        load_graph(tmp_path / "own.toml", {}, OWN)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("defered", "graph 'defered': no such graph; did you mean 'deferred'?"),
+        ("zzz", "graph 'zzz': no such graph; known: "),
+        ("zzz.toml", "zzz.toml: no such graph file; built-in graphs: "),
+        ("", "graph '': no such graph"),
+        ("a\0b", "no such graph"),
+        ("x" * 5000, "no such graph"),
+    ],
+    ids=lambda value: value[:12],
+)
+def test_a_graph_that_is_not_there(name, message):
+    with pytest.raises(GraphError) as raised:
+        load_graph(name)
+    assert message in str(raised.value)
+
+
+def test_a_base_that_is_not_there(tmp_path):
+    path = write(tmp_path, 'extends = "defered"\n')
+    with pytest.raises(GraphError, match="did you mean 'deferred'"):
+        load_graph(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[passes", "not TOML: "),
+        ("passes = 3", "passes: wants a table [passes.NAME] for each pass"),
+        ("[[passes]]", "passes: wants a table [passes.NAME] for each pass"),
+        ("extends = 3", "extends: wants the name or path of a graph"),
+        ("outputs = 3", 'outputs: wants name = "pass.port" lines'),
+        ("[outputs]\nimage = 3", 'outputs: wants name = "pass.port" lines'),
+        ("[passes.end]\ntype='blur'", 'outputs: none; add a table [outputs] with radiance = "pass.port"'),
+        ("[outputs]", "outputs: none; "),
+        (SMALL + "[pases.end]\nradius = 1", "pases: no such key; did you mean 'passes'?"),
+        ("[passes.end]\ntype = 'blurr'", "passes.end: no pass type 'blurr'; did you mean 'blur'?"),
+        ("[passes.tonemapp]", "passes.tonemapp: no pass type 'tonemapp'; did you mean 'tonemap'?"),
+        ("[passes.end]\ntype = 3", "passes.end.type: is 3, but wants the name of a pass type"),
+        ("[passes.end]\ntype = []", "passes.end.type: is [], but wants the name of a pass type"),
+        ("[passes.end]\ntype = {}", "passes.end.type: is {}, but wants the name of a pass type"),
+        ("[passes]\nend = 3", "passes.end: wants a table of parameters and inputs"),
+        ("[passes]\nend = true", "passes.end: wants a table of parameters and inputs"),
+        ("[passes.end]\ninputs = 3", 'passes.end.inputs: wants { port = "pass.port" }'),
+        ("[passes.end]\ninputs = {image = 3}", 'passes.end.inputs: wants { port = "pass.port" }'),
+        ("[passes.end]\ntype = 'blur'\nradius = 10", "end.radius: is 10, but wants a number at least 0 and at most 9"),
+        ("[passes.end]\ntype = 'blur'\nradus = 1", "end.radus: no such parameter; did you mean 'radius'?"),
+        ("[passes.end]\ntype = 'blur'\n'rad\\nius' = 1", "no such parameter"),
+        ('[passes.end]\ntype = "blur"\n"rad\\nius" = 1', "no such parameter"),
+        ('[passes."e\\nd"]', "no pass type"),
+        ('"ke\\ny" = 1', "no such key"),
+        (f"a = {'[' * 10_000}", "not TOML"),
+        (f"a = {'9' * 5000}", "not TOML"),
+    ],
+    ids=lambda value: value[:40],
+)
+def test_each_fault_of_a_file_is_told(tmp_path, text, message):
+    assert message in fault(tmp_path, text)
+
+
+def test_all_faults_of_a_file_are_told_at_once(tmp_path):
+    text = "outs = 1\n[passes.a]\ntype = 'blurr'\n[passes.b]\ntype = 'blur'\nradius = -1\nradus = 2\n[passes.c]\n"
+    told = fault(tmp_path, text, {"d.radius": 1})
+    for part in ("outs: ", "passes.a: ", "b.radius: ", "b.radus: ", "passes.c: ", "outputs: ", "set d.radius: "):
+        assert told.count(part) == 1, part
+
+
+def test_a_file_that_is_no_text(tmp_path):
+    (tmp_path / "own.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(GraphError, match=r"own\.toml: cannot be read"):
+        load_graph(tmp_path / "own.toml")
+
+
+# Settings
+
+
+def test_settings_are_laid_over_the_file(tmp_path):
+    path = write(tmp_path, SMALL + "radius = 2.0\n")
+    graph = load_graph(path, {"end.radius": 3, "start.steps": 9}, OWN)
+    assert graph.nodes["end"].work.params == Params(radius=3.0)
+    assert graph.nodes["start"].work.params == Params(steps=9)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("radius", 1, "set radius: wants pass.param = value"),
+        ("end.", 1, "end.: no such parameter"),
+        ("end.type", "blur", "set end.type: wants pass.param = value"),
+        ("end.inputs", {}, "set end.inputs: wants pass.param = value"),
+        ("ende.radius", 1, "set ende.radius: no pass 'ende' in this graph; did you mean 'end'?"),
+        ("end.radus", 1, "end.radus: no such parameter; did you mean 'radius'?"),
+        ("end.radius", "wide", "end.radius: is 'wide', but wants a number at least 0 and at most 9"),
+        ("end.radius", [1], "end.radius: is [1], but wants a number"),
+    ],
+)
+def test_each_fault_of_a_setting_is_told(tmp_path, key, value, message):
+    assert message in fault(tmp_path, SMALL, {key: value})
+
+
+# Hash
+
+
+def test_the_hash_changes_with_parameters_wiring_outputs_and_nothing_else(tmp_path):
+    def hashed(text: str, **chosen: Any) -> str:
+        return graph_hash(load_graph(write(tmp_path, text), {"end.radius": 1.0, **chosen}, OWN))
+
+    plain = hashed(SMALL)
+    assert hashed(SMALL) == plain
+    assert hashed(f"# comment\n{SMALL}") == plain
+    assert hashed(SMALL + "radius = 1\n") == plain
+    others = {
+        hashed(SMALL, **{"start.steps": 4}),
+        hashed(SMALL, **{"end.radius": 1.5}),
+        hashed(SMALL.replace('image = "end.out"', 'image = "start.out"')),
+        hashed(SMALL.replace('inputs = { image = "start.out" }', "")),
+        hashed(SMALL.replace("passes.start", "passes.other").replace("start.out", "other.out")),
+    }
+    assert len(others | {plain}) == 6
+    assert all(len(value) == 16 and int(value, 16) >= 0 for value in others)
+
+
+# Anything at all
+
+WORDS = st.sampled_from(["extends", "outputs", "passes", "type", "inputs", "end", "blur", "vpl", "radius", "end.out"])
+VALUES = st.recursive(
+    st.booleans() | st.integers() | st.floats() | WORDS | st.text(st.characters(max_codepoint=0x7E), max_size=6),
+    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(WORDS, inner, max_size=3),
+    max_leaves=10,
+)
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.fixed_dictionaries(
+        {},
+        optional={
+            "extends": st.just("deferred") | VALUES,
+            "outputs": VALUES,
+            "passes": st.dictionaries(WORDS, VALUES, max_size=3) | VALUES,
+            "other": VALUES,
+        },
+    ),
+    st.dictionaries(st.sampled_from(["end.radius", "vpl.count", "end"]) | st.text(max_size=5), VALUES, max_size=2),
+)
+def test_any_file_gives_a_graph_or_one_line(tmp_path, table, chosen):
+    path = write(tmp_path, "\n".join(f"{key} = {toml(value)}" for key, value in table.items()))
+    try:
+        graph = load_graph(path, chosen, OWN)
+        compile(graph, list(graph.outputs))
+    except GraphError as error:
+        message = str(error)
+    else:
+        message = "compiled"
+    assert len(message.splitlines()) == 1

@@ -1,0 +1,291 @@
+"""What of glTF files trimesh alone would lose, round or pass over."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from deferred_ir.base.errors import SceneError
+from deferred_ir.loading import merge, models
+from deferred_ir.scene import materials
+from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.scene import Scene
+
+TYPES = {"float32": 5126, "uint8": 5121, "uint16": 5123, "uint32": 5125}
+SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+POSITIONS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+UVS = np.array([[0, 1], [1, 1], [0, 0]], np.float32)  # glTF's v runs down
+
+
+def png(color: tuple[int, ...]) -> str:
+    """A data URI of an image of one colour."""
+    data = io.BytesIO()
+    Image.new("RGB", (2, 2), color).save(data, "PNG")
+    return "data:image/png;base64," + base64.b64encode(data.getvalue()).decode()
+
+
+class Document:
+    """A glTF document in the making: one triangle in the primitives that `triangle` adds, each of its own mesh."""
+
+    def __init__(self, **tables: Any) -> None:
+        self.json: dict[str, Any] = {"asset": {"version": "2.0"}, "meshes": [], "nodes": [], "scenes": [{"nodes": []}]}
+        self.json |= {"accessors": [], "bufferViews": [], **tables}
+        self.data = b""
+
+    def accessor(self, values: np.ndarray, **keys: Any) -> int:
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": values.nbytes}
+        self.data += values.tobytes() + b"\0" * (-values.nbytes % 4)
+        self.json["bufferViews"].append(view)
+        columns = 1 if values.ndim == 1 else values.shape[1]
+        accessor = {"bufferView": len(self.json["bufferViews"]) - 1, "componentType": TYPES[values.dtype.name]}
+        self.json["accessors"].append(accessor | {"count": len(values), "type": SHAPES[columns]} | keys)
+        return len(self.json["accessors"]) - 1
+
+    def triangle(
+        self, primitive: dict[str, Any] | None = None, node: dict[str, Any] | None = None, **extra: int
+    ) -> int:
+        attributes = {"POSITION": self.accessor(POSITIONS), **extra}
+        self.json["meshes"].append({"primitives": [{"attributes": attributes, **(primitive or {})}]})
+        self.json["nodes"].append({"mesh": len(self.json["meshes"]) - 1, **(node or {})})
+        self.json["scenes"][0]["nodes"].append(len(self.json["nodes"]) - 1)
+        return len(self.json["nodes"]) - 1
+
+    def write(self, path: Path) -> Path:
+        if path.suffix == ".gltf":
+            uri = "data:application/octet-stream;base64," + base64.b64encode(self.data).decode()
+            path.write_text(json.dumps(self.json | {"buffers": [{"byteLength": len(self.data), "uri": uri}]}))
+            return path
+        text = json.dumps(self.json | {"buffers": [{"byteLength": len(self.data)}]}).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = struct.pack("<I4s", len(text), b"JSON") + text
+        chunks += struct.pack("<I4s", len(self.data), b"BIN\0") + self.data
+        path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+        return path
+
+
+def load(path: Path) -> Scene:
+    data = models.read(path)
+    geometry, found, textures, ranges = merge.merge([(data, None)], "scene.toml")
+    camera, light = Camera((0, 0, 1), (0, 0, 0)), Spotlight((0, 0, 1), (0, 0, 0))
+    return Scene("test", path, geometry, found, textures, ranges, camera, light, notes=data.notes)
+
+
+def material(factor: list[float], **more: Any) -> dict[str, Any]:
+    return {"pbrMetallicRoughness": {"baseColorFactor": factor, "metallicFactor": 0}, **more}
+
+
+@pytest.mark.parametrize("name", ["m.gltf", "m.glb"])
+def test_base_colours_are_not_rounded_and_found_by_index(tmp_path: Path, name: str) -> None:
+    document = Document(
+        materials=[
+            material([0.1234, 0.03, 0.98765, 1], name="same"),
+            material([0.5, 0.25, 0.125, 1], name="same"),
+            material([0.75, 0.75, 0.75, 1]),
+        ]
+    )
+    for place, primitive in enumerate([{"material": 1}, {"material": 0}, {"material": 2}, {}]):
+        document.triangle(primitive, {"translation": [10 * place, 0, 0]})
+    scene = load(document.write(tmp_path / name))
+    geometry = scene.geometry
+    in_places = np.argsort(geometry.positions[geometry.faces[:, 0], 0])
+    found = [scene.materials[index] for index in geometry.face_materials[in_places]]
+    assert [item.albedo for item in found] == [(0.5, 0.25, 0.125), (0.1234, 0.03, 0.98765), (0.75,) * 3, (1.0,) * 3]
+    assert [item.name for item in found[:3]] == ["same", "same", "2"]
+    assert scene.notes == ()
+
+
+def test_base_colour_multiplies_the_texture_and_vertex_colours(tmp_path: Path) -> None:
+    base = {"baseColorFactor": [0.5, 1, 1, 1], "baseColorTexture": {"index": 0}, "metallicFactor": 0}
+    document = Document(
+        materials=[{"pbrMetallicRoughness": base}],
+        textures=[{"source": 1}],
+        images=[{"uri": "unused and missing.png"}, {"uri": png((255, 255, 0))}],
+    )
+    colors = np.tile(np.array([1, 0.3, 1, 0.5], np.float32), (3, 1))
+    document.triangle({"material": 0}, TEXCOORD_0=document.accessor(UVS), COLOR_0=document.accessor(colors))
+    scene = load(document.write(tmp_path / "m.glb"))
+    found = materials.albedo(scene, np.array([0]), np.full((1, 3), 1 / 3))
+    assert found == pytest.approx(np.array([[0.5, 0.3, 0.0]]), abs=1e-6)
+    assert scene.geometry.uvs == pytest.approx(np.array([[0, 0], [1, 0], [0, 1]]))
+
+
+@pytest.mark.parametrize(
+    ("dtype", "top"), [("uint8", 255), ("uint16", 65535), ("float32", 1)], ids=["uint8", "uint16", "float"]
+)
+@pytest.mark.parametrize("bare", [True, False])
+def test_vertex_colours_are_linear(tmp_path: Path, dtype: str, top: int, bare: bool) -> None:
+    document = Document(materials=[material([1, 1, 1, 1])])
+    values = np.array([[0, 0.2, 1], [1, 0.4, 0], [0.6, 0.6, 0.6]])
+    colors = document.accessor((values * top).astype(dtype), normalized=dtype != "float32")
+    if dtype == "uint8":  # rows are padded to 4 bytes there
+        values = np.concatenate([values, np.ones((3, 1))], axis=1)
+        colors = document.accessor((values * top).astype(dtype), normalized=True)
+    document.triangle({} if bare else {"material": 0}, COLOR_0=colors)
+    scene = load(document.write(tmp_path / "m.gltf"))
+    assert scene.geometry.colors == pytest.approx(values[:, :3], abs=1e-6 if dtype == "float32" else 1 / top)
+
+
+def test_specular_glossiness_keeps_its_diffuse_colour(tmp_path: Path) -> None:
+    glossy = {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": [0.2, 0.3, 0.4, 1]}}
+    document = Document(materials=[{"extensions": glossy}], extensionsUsed=list(glossy))
+    document.triangle({"material": 0})
+    scene = load(document.write(tmp_path / "m.gltf"))
+    assert scene.materials[0].albedo == (0.2, 0.3, 0.4)
+    assert "not honoured: KHR_materials_pbrSpecularGlossiness" in scene.notes[0]
+
+
+def test_parents_and_children_of_a_camera_keep_their_place(tmp_path: Path) -> None:
+    document = Document(cameras=[{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1, "aspectRatio": 1}}])
+    child = document.triangle(node={"translation": [0, 0, 3], "name": "child"})
+    document.json["nodes"].append({"camera": 0, "translation": [0, 5, 0], "children": [child]})
+    document.json["nodes"].append({"scale": [2, 2, 2], "children": [1]})
+    document.json["scenes"] = [{"nodes": [2]}]
+    scene = load(document.write(tmp_path / "m.glb"))
+    assert scene.geometry.bounds == pytest.approx(np.array([[0, 10, 6], [2, 12, 6]]))
+    assert "m.glb: its lights and cameras are ignored" in scene.notes
+
+
+def test_nodes_without_a_scene_are_drawn(tmp_path: Path) -> None:
+    document = Document()
+    document.triangle()
+    del document.json["scenes"]
+    assert len(load(document.write(tmp_path / "m.gltf")).geometry.faces) == 1
+
+
+def test_strips_and_plain_vertices(tmp_path: Path) -> None:
+    document = Document()
+    document.triangle({"mode": 5, "indices": document.accessor(np.array([0, 1, 2, 1], np.uint16))})
+    document.triangle({"mode": 1})
+    scene = load(document.write(tmp_path / "m.glb"))
+    assert len(scene.geometry.faces) == 2
+    assert "m.glb: points, lines and triangle fans are left out" in scene.notes
+
+
+def test_what_is_not_honoured_is_noted(tmp_path: Path) -> None:
+    texture = {"index": 0, "texCoord": 1, "extensions": {"KHR_texture_transform": {"scale": [2, 2]}}}
+    document = Document(
+        materials=[
+            {"pbrMetallicRoughness": {"baseColorTexture": texture}, "emissiveFactor": [1, 0, 0], "alphaMode": "BLEND"}
+        ],
+        textures=[{"source": 0, "sampler": 0}],
+        samplers=[{"wrapS": 33071}],
+        images=[{"uri": png((255, 0, 0))}],
+        extensionsUsed=["KHR_texture_transform", "KHR_materials_unlit", "KHR_lights_punctual", "EXT_texture_webp"],
+        animations=[{"channels": [], "samplers": []}],
+    )
+    document.triangle({"material": 0}, TEXCOORD_0=document.accessor(UVS))
+    assert load(document.write(tmp_path / "m.gltf")).notes == (
+        "m.gltf: not honoured: KHR_materials_unlit, KHR_texture_transform",
+        "m.gltf: its lights and cameras are ignored",
+        "m.gltf: emission is ignored",
+        "m.gltf: transparency is ignored",
+        "m.gltf: metals are taken as matt surfaces of their base colour",
+        "m.gltf: texture coordinates other than the first set are not honoured",
+        "m.gltf: textures repeat, although the file wants them clamped or mirrored",
+        "m.gltf: animations and skins are ignored",
+    )
+
+
+def test_images_next_to_the_file(tmp_path: Path) -> None:
+    document = Document(
+        materials=[{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        textures=[{"source": 0}],
+        images=[{"uri": "a%20b.png"}],
+    )
+    document.triangle({"material": 0}, TEXCOORD_0=document.accessor(UVS))
+    path = document.write(tmp_path / "m.gltf")
+    with pytest.raises(SceneError, match=r"m\.gltf: material 0: image a%20b\.png is missing or not readable"):
+        load(path)
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "a b.png")
+    assert len(load(path).textures) == 1
+    (tmp_path / "a b.png").write_bytes(b"no image")
+    with pytest.raises(SceneError, match=r"image a%20b\.png is missing or not readable"):
+        load(path)
+
+
+def test_one_image_of_two_materials_is_one_texture(tmp_path: Path) -> None:
+    base = {"baseColorTexture": {"index": 0}}
+    document = Document(
+        materials=[{"pbrMetallicRoughness": base}, {"pbrMetallicRoughness": base | {"baseColorFactor": [1, 0, 0, 1]}}],
+        textures=[{"source": 0}],
+        images=[{"uri": png((255, 0, 0))}],
+    )
+    for index in (0, 1):
+        document.triangle({"material": index}, TEXCOORD_0=document.accessor(UVS))
+    scene = load(document.write(tmp_path / "m.glb"))
+    assert len(scene.textures) == 1
+    assert [item.texture for item in scene.materials] == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "compressed with KHR_draco_mesh_compression; export"),
+        ({"accessors": [{"count": 3, "componentType": 5126, "type": "VEC3"}]}, "sparse or compressed accessors"),
+        ({"materials": [material([-1, 0, 0, 1])]}, "material 0: reflectance"),
+        ({"materials": [material([1, 1])]}, "malformed glTF (ValueError: baseColorFactor has fewer"),
+        ({"materials": 3}, "malformed glTF"),
+        ({"nodes": [3]}, "malformed glTF"),
+        ({"meshes": [{}]}, "malformed glTF (KeyError: 'primitives')"),
+        ({"scenes": [{"nodes": [7]}]}, "scenes[0].nodes: 7 is none of the 1 that there are; export it again"),
+        ({"asset": {"version": "1.0"}}, "only GLTF 2 is supported"),
+        ({"scenes": [{"nodes": []}]}, "no triangles"),
+    ],
+)
+def test_broken_documents(tmp_path: Path, change: dict[str, Any], expected: str) -> None:
+    document = Document(materials=[material([1, 1, 1, 1])])
+    document.triangle({"material": 0})
+    document.json |= change
+    path = document.write(tmp_path / "m.gltf")
+    with pytest.raises(SceneError) as caught:
+        load(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert expected in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_quantised_coordinates_are_refused(tmp_path: Path) -> None:
+    document = Document()
+    uvs = document.accessor((UVS * 65535).astype(np.uint16), normalized=True)
+    document.triangle(TEXCOORD_0=uvs)
+    with pytest.raises(SceneError, match="TEXCOORD_0 is stored in normalised integers"):
+        load(document.write(tmp_path / "m.glb"))
+
+
+def test_missing_buffer(tmp_path: Path) -> None:
+    document = Document()
+    document.triangle()
+    path = document.write(tmp_path / "m.gltf")
+    text = json.loads(path.read_text())
+    text["buffers"][0]["uri"] = "gone.bin"
+    path.write_text(json.dumps(text))
+    with pytest.raises(SceneError, match=r"m\.gltf: gone\.bin is missing; put it next to the model"):
+        load(path)
+
+
+@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_damaged_glb_gives_a_scene_or_one_line(tmp_path: Path, data: st.DataObject) -> None:
+    document = Document(materials=[material([1, 1, 1, 1])])
+    document.triangle({"material": 0, "indices": document.accessor(np.array([0, 1, 2], np.uint16))})
+    path = document.write(tmp_path / "m.glb")
+    content = bytearray(path.read_bytes())
+    for _ in range(data.draw(st.integers(1, 3))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path.write_bytes(content[: data.draw(st.integers(0, len(content)) | st.just(len(content)))])
+    try:
+        message = f"{len(load(path).geometry.faces)} faces"
+    except SceneError as error:
+        message = str(error)
+    assert len(message.splitlines()) == 1

@@ -1,0 +1,164 @@
+"""The graph `incremental`: maps that are kept hold what a map drawn anew holds, within the budget."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_scenes import build, plane, room
+
+from deferred_ir.base.errors import GraphError
+from deferred_ir.cli import main
+from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
+
+SIZE = (48, 32)
+ROOM = room()
+SETTINGS = {"vpl.count": 24, "shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}
+
+
+def moved(scene, step):
+    """The scene with its light a little further."""
+    x, y, z = scene.spotlight.position
+    return replace(scene, spotlight=replace(scene.spotlight, position=(x + 0.06 * step, y - 0.02 * step, z)))
+
+
+def atlas_of(one):
+    with one.gpu.ctx:
+        return one.executor.resource(("shadow_maps", "atlas")).read()[..., 0]
+
+
+def tiles_of(one, size=32):
+    """Maps of the VPLs that are alive, by tile."""
+    atlas = atlas_of(one)
+    per_row = atlas.shape[1] // size
+    tiles = one.executor.resource(("vpl", "lights")).records["tile"][1:].astype(int)
+    rows = atlas.reshape(len(atlas), per_row, size, per_row, size).swapaxes(2, 3)
+    return {tile: rows[1 + tile // per_row**2, tile % per_row**2 // per_row, tile % per_row] for tile in tiles}
+
+
+@pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
+@pytest.mark.parametrize("layer_from_vertex", [True, False])
+def test_kept_maps_hold_what_maps_drawn_anew_hold(renderer, projection, layer_from_vertex):
+    one = renderer(SIZE, "incremental", set={**SETTINGS, "shadow_maps.projection": projection})
+    if not layer_from_vertex:
+        one.gpu.layer_from_vertex = False
+    plan = one.plan(ROOM)
+    for step in range(9):
+        one.draw(moved(ROOM, step), plan)
+        assert one.executor.counters["maps_drawn"] <= 1 + 8
+    kept, spot = tiles_of(one), atlas_of(one)[0]
+    assert len(kept) > 16
+    one.executor.resource(("shadow_maps", "atlas")).kept = None
+    one.draw(moved(ROOM, 8), plan)
+    assert one.executor.counters["maps_drawn"] == 1 + len(kept)
+    anew = tiles_of(one)
+    assert kept.keys() == anew.keys()
+    assert all((kept[tile] == anew[tile]).all() for tile in kept)
+    assert (atlas_of(one)[0] == spot).all()
+
+
+def test_tiles_of_every_block_of_lights_are_kept(renderer):
+    count = LIGHTS_PER_BLOCK + 40
+    settings = {"vpl.count": count, "vpl.most": count, "shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 16}
+    one = renderer(SIZE, "incremental", set=settings)
+    plan = one.plan(ROOM)
+    one.draw(ROOM, plan)
+    assert one.executor.counters["maps_drawn"] == 1 + count
+    first = tiles_of(one, 16)
+    one.draw(moved(ROOM, 1), plan)
+    assert one.executor.counters["maps_drawn"] < count
+    lights = one.executor.resource(("vpl", "lights"))
+    same = [tile for tile in tiles_of(one, 16) if (first.get(tile) == tiles_of(one, 16)[tile]).all()]
+    assert len(same) > count // 2
+    assert len(np.unique(lights.records["tile"])) == len(lights.records)
+
+
+def test_a_still_light_draws_nothing_and_shows_the_same(renderer):
+    one = renderer(SIZE, "incremental", set=SETTINGS)
+    plan = one.plan(ROOM)
+    for _ in range(8):
+        one.draw(ROOM, plan)
+    before = one.read(plan).radiance
+    one.draw(ROOM, plan)
+    assert one.executor.counters["maps_drawn"] == 0
+    assert (one.read(plan).radiance == before).all()
+
+
+def test_only_the_spotlights_map_follows_a_light_that_vpls_do_not_notice(renderer):
+    one = renderer(SIZE, "incremental", set={**SETTINGS, "vpl.most": 24, "vpl.least": 0})
+    plan = one.plan(ROOM)
+    one.draw(ROOM, plan)
+    x, y, z = ROOM.spotlight.position
+    one.draw(replace(ROOM, spotlight=replace(ROOM.spotlight, position=(x, y - 1e-4, z))), plan)
+    assert one.executor.counters["maps_drawn"] == 1
+
+
+def test_frames_come_again_after_a_reset(renderer):
+    one = renderer(SIZE, "incremental", set=SETTINGS)
+    plan = one.plan(ROOM)
+    runs = []
+    for _ in range(2):
+        frames = []
+        for step in range(4):
+            one.draw(moved(ROOM, step), plan, seed=5)
+            frames.append(one.read(plan).radiance)
+        runs.append(frames)
+        one.reset()
+    np.testing.assert_array_equal(*runs)
+    assert not np.array_equal(runs[0][0], runs[0][3])
+
+
+@pytest.mark.parametrize("change", ["scene", "seed", "off"])
+def test_state_ends_with_scene_and_seed_and_when_the_light_is_off(renderer, change):
+    one = renderer(SIZE, "incremental", set=SETTINGS)
+    fresh = one.render(ROOM).radiance
+    first = one.executor.counters["vpls_alive"]
+    one.render(ROOM)
+    assert one.executor.counters["vpls_alive"] > first
+    if change == "scene":
+        one.render(build(plane(9.0, -1.0)))
+    elif change == "seed":
+        one.render(ROOM, seed=1)
+    else:
+        dark = replace(ROOM, spotlight=replace(ROOM.spotlight, emission=(0.0, 0.0, 0.0)))
+        assert one.render(dark).radiance.max() == 0
+    assert (one.render(ROOM).radiance == fresh).all()
+    assert one.executor.counters["maps_drawn"] <= 9
+
+
+def test_without_a_budget_there_is_direct_light_alone(renderer):
+    none = renderer(SIZE, "incremental", set={**SETTINGS, "vpl.least": 0, "vpl.most": 0}).render(ROOM)
+    direct = renderer(SIZE, "deferred", set={"shadow_maps.spot_size": 128}).render(ROOM, vpls=0)
+    np.testing.assert_array_equal(none.radiance, direct.radiance)
+
+
+def test_with_the_whole_budget_one_frame_is_as_bright_as_fresh_vpls(renderer):
+    settings = {"vpl.count": 256, "shadow_maps.vpl_size": 64}
+    one = renderer(SIZE, "incremental", set={**settings, "vpl.most": 256}).render(ROOM).radiance
+    other = renderer(SIZE, "interleaved", set=settings).render(ROOM).radiance
+    assert one.mean() == pytest.approx(other.mean(), rel=0.03)
+
+
+def test_a_least_above_the_most_is_one_line(renderer):
+    with pytest.raises(GraphError, match=r"vpl: least 9: is more than most, 8; give both"):
+        renderer(SIZE, "incremental", set={"vpl.least": 9}).plan(ROOM)
+
+
+def test_a_run_tells_which_maps_it_kept(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    command = "render cornell --graph incremental --size 32x32 --vpls 16 --frames 3 --device software"
+    settings = ["--set", "shadow_maps.spot_size=64", "--set", "shadow_maps.vpl_size=16"]
+    assert main.main([*command.split(), *settings, "--json", "run.json", "-o", "a_%04d.npy"]) == 0
+    assert main.main([*command.split(), *settings, "-o", "b_%04d.npy"]) == 0
+    run = json.loads((tmp_path / "run.json").read_text())
+    assert run["maps_drawn"][0] > 1
+    assert all(drawn <= 9 for drawn in run["maps_drawn"])
+    (parts,) = [entry["subpasses"] for entry in run["passes"] if entry["name"] == "shadow_maps"]
+    assert len(parts) == 1 + run["vpls_alive"]
+    assert (parts[0]["state"], parts[0]["why"]) == ("kept", "its light stays")
+    assert sum(part["state"] == "dirty" for part in parts) == run["maps_drawn"][-1]
+    assert len({(part["layer"], part["tile"]) for part in parts}) == len(parts)
+    for frame in range(3):
+        np.testing.assert_array_equal(*(np.load(f"{name}_{frame:04d}.npy") for name in "ab"))

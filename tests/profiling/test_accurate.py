@@ -1,0 +1,33 @@
+"""The measurement of the parameters of `accurate` runs and says what it found."""
+
+import re
+import sys
+from importlib import import_module
+
+import pytest
+
+accurate = import_module("deferred_ir.profiling.studies.accurate")
+
+
+def run(monkeypatch, *arguments):
+    monkeypatch.setattr(sys, "argv", ["accurate", *arguments])
+    accurate.main()
+
+
+def test_it_prints_a_row_for_each_setting(monkeypatch, capsys):
+    monkeypatch.setattr(accurate, "SAMPLES", (1.0, 4.0))
+    few = "--vpls", "8", "--size", "24x24", "--seeds", "2", "--spp", "16"
+    run(monkeypatch, "colors", "--tables", "samples", *few)
+    out = capsys.readouterr().out
+    assert "| scene | samples | relMSE | near_field, ms | frame, ms |" in out
+    rows = re.findall(r"\| colors \| (\S+) \| ([\d.]+) \(([\d.]+) to ([\d.]+)\) \|", out)
+    assert [name for name, *_ in rows] == ["1", "4"]
+    assert all(0 < float(least) <= float(mean) <= float(most) for _, mean, least, most in rows)
+
+
+def test_a_fault_is_one_line(monkeypatch, capsys):
+    with pytest.raises(SystemExit, match="did you mean"):
+        run(monkeypatch, "cornel")
+    with pytest.raises(SystemExit):
+        run(monkeypatch, "cornell", "--tables", "sample")
+    assert "no 'sample'; there are samples, clamp" in capsys.readouterr().err

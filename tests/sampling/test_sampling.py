@@ -1,0 +1,125 @@
+"""Sample patterns: in the unit square, repeatable, spread; and the disc that keeps areas."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import kstest, qmc
+
+from deferred_ir.sampling.patterns import PATTERNS, disc, unit_square
+
+COUNTS = (0, 1, 2, 3, 5, 7, 16, 60, 64, 100, 255, 1000)
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+@pytest.mark.parametrize("count", COUNTS)
+def test_points_lie_in_the_half_open_unit_square(pattern, count):
+    points = unit_square(pattern, count, 3)
+    assert points.shape == (count, 2)
+    assert points.dtype == np.float64
+    assert ((points >= 0) & (points < 1)).all()
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_the_same_seed_gives_the_same_points_and_another_seed_others(pattern):
+    first = unit_square(pattern, 64, 0).copy()
+    unit_square.cache_clear()
+    np.testing.assert_array_equal(unit_square(pattern, 64, 0), first)
+    assert not np.array_equal(unit_square(pattern, 64, 1), first)
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_the_cached_points_cannot_be_spoilt(pattern):
+    with pytest.raises(ValueError, match="read-only"):
+        unit_square(pattern, 4, 0)[0, 0] = 2
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_points_are_uniform_over_seeds(pattern):
+    """No pattern prefers a place, whatever the count."""
+    points = np.concatenate([unit_square(pattern, 6, seed) for seed in range(400)])
+    for axis in range(2):
+        assert kstest(points[:, axis], "uniform").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("pattern", ["stratified", "halton", "sobol"])
+@pytest.mark.parametrize("count", [60, 64, 256])
+def test_patterns_are_spread_more_evenly_than_chance(pattern, count):
+    discrepancy = np.median([qmc.discrepancy(unit_square(pattern, count, seed)) for seed in range(5)])
+    chance = np.median([qmc.discrepancy(unit_square("random", count, seed)) for seed in range(5)])
+    assert discrepancy < 0.5 * chance
+
+
+@given(st.integers(1, 700), st.integers(0, 50))
+def test_each_stratified_point_has_a_cell_of_equal_area_to_itself(count, seed):
+    """Rows of cells that tile the square: `rows` is read off the points, which come row by row."""
+    points = unit_square("stratified", count, seed)
+    rows = max(1, round(np.sqrt(count)))
+    per_row = np.diff(np.arange(rows + 1) * count // rows)
+    assert per_row.min() >= 1
+    assert per_row.max() - per_row.min() <= 1
+    edge, start = 0.0, 0
+    for n in per_row:
+        height = n / count  # so that each of its n cells has the area 1 / count
+        row = points[start : start + n]
+        assert (row[:, 1] >= edge - 1e-12).all()
+        assert (row[:, 1] <= edge + height + 1e-12).all()
+        np.testing.assert_array_equal(np.floor(row[:, 0] * n).astype(int), np.arange(n))
+        edge, start = edge + height, start + n
+    assert edge == pytest.approx(1)
+
+
+def test_stratified_cells_are_squares_where_the_count_is_one():
+    cells = np.floor(unit_square("stratified", 400, 0) * 20).astype(int)
+    assert len({tuple(cell) for cell in cells}) == 400
+
+
+@pytest.mark.parametrize("m", [0, 1, 4, 6, 10])
+def test_sobol_points_are_stratified_in_each_elementary_interval(m):
+    points = unit_square("sobol", 2**m, 5)
+    for k in range(m + 1):
+        cells = np.floor(points * (2**k, 2 ** (m - k))).astype(int)
+        assert len({tuple(cell) for cell in cells}) == 2**m
+
+
+# The disc
+
+
+def test_the_disc_is_filled_evenly():
+    points = disc(unit_square("random", 1_000_000, 0))
+    radius, angle = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
+    assert radius.max() <= 1
+    assert radius.mean() == pytest.approx(2 / 3, rel=1e-3)
+    np.testing.assert_allclose(points.mean(axis=0), 0, atol=2e-3)
+    rings, _ = np.histogram(radius**2, bins=20, range=(0, 1))  # rings of equal area, the innermost included
+    np.testing.assert_allclose(rings / rings.mean(), 1, atol=0.02)
+    sectors, _ = np.histogram(angle, bins=24, range=(-np.pi, np.pi))
+    np.testing.assert_allclose(sectors / sectors.mean(), 1, atol=0.02)
+
+
+@given(st.floats(0.001, 0.999), st.floats(0.001, 0.999))
+def test_the_disc_map_preserves_area_everywhere(u, v):
+    """Its Jacobian is pi; differences taken on one side of the diagonals, where it has a kink."""
+    h = 1e-6
+    near_kink = abs(u - v) < 4 * h or abs(u + v - 1) < 4 * h
+    if near_kink:
+        return
+    p = disc(np.array([[u - h, v], [u + h, v], [u, v - h], [u, v + h]]))
+    du, dv = (p[1] - p[0]) / (2 * h), (p[3] - p[2]) / (2 * h)
+    assert abs(du[0] * dv[1] - du[1] * dv[0]) == pytest.approx(np.pi, rel=1e-4)
+
+
+def test_the_centre_and_the_corners_of_the_square():
+    points = disc(np.array([[0.5, 0.5], [0, 0.5], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0], [1, 1], [1, 0], [0, 1]]))
+    assert np.isfinite(points).all()
+    np.testing.assert_allclose(points[:5], [[0, 0], [-1, 0], [0, -1], [1, 0], [0, 1]], atol=1e-15)
+    np.testing.assert_allclose(np.hypot(*points[5:].T), 1)
+
+
+@given(st.tuples(st.floats(0, 1), st.floats(0, 1)))
+def test_neighbours_stay_neighbours(point):
+    step = np.array([[0, 0], [1e-5, 0], [0, 1e-5]])
+    p = disc(np.clip(np.array(point) * (1 - 1e-5) + step, 0, 1))
+    assert np.linalg.norm(p[1:] - p[0], axis=1).max() < 5e-5

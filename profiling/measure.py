@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from deferred_ir.output.image import write_whole
-from deferred_ir.truth.path_tracer import Progress
+from deferred_ir.base.files import write_whole
+from deferred_ir.base.parallel import Progress
 
 
 def arguments(doc: str | None, output: bool = True) -> argparse.ArgumentParser:

@@ -13,11 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.errors import SettingError
+from deferred_ir.base.files import check_folder, write_json
 from deferred_ir.engine.settings import chosen_settings, chosen_size, notes
 from deferred_ir.graph.file import load_graph
 from deferred_ir.loading.load import builtin_scenes, load
-from deferred_ir.output.image import check_folder
-from deferred_ir.report.run_json import write
 from deferred_ir.scene.scene import RenderDefaults, Scene
 
 VPL_SIZE = "shadow_maps.vpl_size"
@@ -49,7 +48,7 @@ def run(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
         work.append((scene, options))
     rows = _visibility(visibility, work)
     if json:
-        write(json, {"visibility": [row.as_dict() for row in rows]})
+        write_json(json, {"visibility": [row.as_dict() for row in rows]})
     return 0
 
 
@@ -75,7 +74,7 @@ def _run_stability(arguments: argparse.Namespace, settings: Mapping[str, Any], j
             print(f"note: {scene.name}: {text}", file=sys.stderr)
     rows = _stability(extremes, CASES, scenes, arguments.device)
     if json:
-        write(json, {"stability": [row.as_dict() for row in rows]})
+        write_json(json, {"stability": [row.as_dict() for row in rows]})
     return 0 if all(row.holds for row in rows) else 1
 
 

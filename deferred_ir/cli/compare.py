@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.errors import OutputError, SettingError, shown
-from deferred_ir.output.image import check_folder
+from deferred_ir.base.files import check_folder, write_json
 from deferred_ir.output.read import read_radiance, read_record, record_path
-from deferred_ir.report.run_json import write
 from deferred_ir.truth import error_picture
 from deferred_ir.truth.metrics import Comparison, compare
 
@@ -35,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
         error_picture.save(diff, error_picture.signed_error(image, reference, result.reference_mean))
     if json:
         names = {"image": str(image_path), "reference": str(reference_path)}
-        write(json, {**names, "scene_hash": reference_record.get("scene_hash"), **result.as_dict()})
+        write_json(json, {**names, "scene_hash": reference_record.get("scene_hash"), **result.as_dict()})
     print(table(result))
     return 0
 

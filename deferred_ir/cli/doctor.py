@@ -173,20 +173,16 @@ def _numbers(version: str) -> list[int]:
 
 
 def _rays() -> Check:
-    """Traces one ray: embreex brings a compiled Embree, so an import alone proves little."""
+    """Traces one ray."""
     try:
-        import numpy as np
-        from embreex import rtcore_scene
-        from embreex.mesh_construction import TriangleMesh
-    except ImportError as error:
+        from deferred_ir.rays.embree import traces_a_ray
+
+        found = traces_a_ray()
+    except (ImportError, DeviceError) as error:
         no_wheel = platform.system() == "Linux" and platform.machine() == "aarch64"
         mend = "no wheel for Linux arm64: render with --vpls 0" if no_wheel else "pip install 'embreex>=4.4'"
-        return Check("embreex", False, str(error), mend, optional=no_wheel)
-    scene = rtcore_scene.EmbreeScene(robust=True)
-    corners = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1]], np.float32)
-    TriangleMesh(scene, corners, np.array([[0, 1, 2]], np.int32))
-    face = scene.run(np.array([[0.2, 0.2, 0]], np.float32), np.array([[0, 0, 1]], np.float32), output=1)["primID"]
-    if face[0] != 0:
+        return Check("embreex", False, str(error.__cause__ or error), mend, optional=no_wheel)
+    if not found:
         return Check("embreex", False, "a test ray missed", "pip install --force-reinstall embreex")
     return Check("embreex", True, f"{metadata.version('embreex')}, traces rays")
 
@@ -288,13 +284,13 @@ def _display() -> Check:
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         return Check(name, False, "none; only the viewer needs one", "set DISPLAY, or use xvfb-run", optional=True)
     try:
-        import glfw
+        from deferred_ir.gl.window import display_opens
+
+        opens = display_opens()
     except ImportError as error:
         return Check(name, False, str(error), "pip install glfw", optional=True)
-    glfw.ERROR_REPORTING = "ignore"
-    if not glfw.init():
+    if not opens:
         return Check(name, False, "GLFW cannot reach it", "check DISPLAY; only the viewer needs one", optional=True)
-    glfw.terminate()
     return Check(name, True, f"GLFW {metadata.version('glfw')}", optional=True)
 
 

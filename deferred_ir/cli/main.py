@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from deferred_ir.base import interrupts
-from deferred_ir.base.errors import Error, SettingError
+from deferred_ir.base.errors import Error
 
 LATEST = 1e9
 
@@ -231,23 +231,11 @@ def _whole(text: str, least: int) -> int:
     return int(text)
 
 
-def settings(pairs: Sequence[str]) -> dict[str, Any]:
-    """{"pass.param": value} of `--set` arguments."""
-    from deferred_ir.graph.params import read_value
-
-    result = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not equals:
-            raise SettingError(f"--set {pair}: wants PASS.PARAM=VALUE")
-        result[key.strip()] = read_value(value.strip())
-    return result
-
-
 def _render(arguments: argparse.Namespace) -> int:
     from deferred_ir.cli.render import render
+    from deferred_ir.engine.settings import parse_settings
 
-    return render(arguments, settings(arguments.set))
+    return render(arguments, parse_settings(arguments.set))
 
 
 def _compare(arguments: argparse.Namespace) -> int:
@@ -258,8 +246,9 @@ def _compare(arguments: argparse.Namespace) -> int:
 
 def _reference(arguments: argparse.Namespace) -> int:
     from deferred_ir.cli.reference import reference
+    from deferred_ir.engine.settings import parse_settings
 
-    return reference(arguments, settings(arguments.set))
+    return reference(arguments, parse_settings(arguments.set))
 
 
 def _profile(arguments: argparse.Namespace) -> int:
@@ -270,18 +259,20 @@ def _profile(arguments: argparse.Namespace) -> int:
 
 def _view(arguments: argparse.Namespace) -> int:
     from deferred_ir.cli.view import run
+    from deferred_ir.engine.settings import parse_settings
 
-    return run(arguments, settings(arguments.set))
+    return run(arguments, parse_settings(arguments.set))
 
 
 def _check(arguments: argparse.Namespace) -> int:
     from deferred_ir.cli.check import run
+    from deferred_ir.engine.settings import parse_settings
 
-    return run(arguments, settings(arguments.set))
+    return run(arguments, parse_settings(arguments.set))
 
 
 def _graph(arguments: argparse.Namespace) -> int:
-    from deferred_ir.engine.settings import chosen_settings
+    from deferred_ir.engine.settings import chosen_settings, parse_settings
     from deferred_ir.graph import file
     from deferred_ir.graph.compile import compile
     from deferred_ir.graph.graph import Facts
@@ -295,7 +286,7 @@ def _graph(arguments: argparse.Namespace) -> int:
         scene = load(arguments.scene)
         facts = scene.facts
         defaults = scene.render
-    graph = file.load_graph(arguments.graph, chosen_settings(defaults, settings(arguments.set), arguments.vpls))
+    graph = file.load_graph(arguments.graph, chosen_settings(defaults, parse_settings(arguments.set), arguments.vpls))
     plan = compile(graph, list(graph.outputs), facts)
     print(plan_text.dot(graph, plan) if arguments.dot else plan_text.summary(plan, scene))
     return 0

@@ -12,14 +12,15 @@ from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.errors import OutputError
+from deferred_ir.base.files import check_folder, write_json
 from deferred_ir.engine.accumulation import Accumulation
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import IMAGES, Renderer
 from deferred_ir.engine.settings import chosen_settings, chosen_size, notes
 from deferred_ir.graph.graph import Plan
 from deferred_ir.loading.load import load
-from deferred_ir.output.image import Image, check_folder, check_path
-from deferred_ir.report.run_json import run_record, write
+from deferred_ir.output.image import Image, check_path
+from deferred_ir.report.run_json import run_record
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.scene.scene import Scene
 
@@ -74,7 +75,7 @@ def render(arguments: argparse.Namespace, settings: Mapping[str, Any]) -> int:
             made = run_record(
                 renderer, scene, str(graph_name), graph, plan, seed=seed, record=record, accumulated=picture.averaged
             )
-            write(json, made)
+            write_json(json, made)
         for note in _unfilled(renderer, plan, arguments):
             print(f"note: {note}", file=sys.stderr)
     if black:

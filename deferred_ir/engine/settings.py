@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from deferred_ir.base.errors import SettingError
+from deferred_ir.graph.params import read_value
 from deferred_ir.loading.scene_file import parse_size
 from deferred_ir.scene.scene import RenderDefaults, Scene
 
@@ -22,6 +23,17 @@ def chosen_size(text: str | None, defaults: RenderDefaults) -> tuple[int, int]:
     if size is None:
         raise SettingError(f"--size {text}: wants WIDTHxHEIGHT in pixels, both above 0, such as 512x512")
     return size
+
+
+def parse_settings(pairs: Sequence[str]) -> dict[str, Any]:
+    """{"pass.param": value} of `--set` arguments."""
+    result = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals:
+            raise SettingError(f"--set {pair}: wants PASS.PARAM=VALUE")
+        result[key.strip()] = read_value(value.strip())
+    return result
 
 
 def chosen_settings(defaults: RenderDefaults, settings: Mapping[str, Any], vpls: int | None) -> dict[str, Any]:

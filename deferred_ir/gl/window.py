@@ -186,3 +186,14 @@ def _last(failures: list[str]) -> str:
         return " ".join(failures[-1].split())
     unset = sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
     return "DISPLAY is not set" if unset else "GLFW does not say why"
+
+
+def display_opens() -> bool:
+    """Whether a window could open here. Raises ImportError without GLFW."""
+    import glfw
+
+    glfw.ERROR_REPORTING = "ignore"
+    if not glfw.init():
+        return False
+    glfw.terminate()
+    return True

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-import uuid
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from deferred_ir.base.errors import OutputError, did_you_mean
+from deferred_ir.base.arrays import Array
+from deferred_ir.base.errors import OutputError, SettingError, did_you_mean
+from deferred_ir.base.files import check_folder, write_whole
 
+LARGEST = float(np.finfo(np.float32).max)
 SUFFIXES = (".png", ".npy", ".exr")
-LONGEST_NAME = 255
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,26 +72,21 @@ def check_path(path: str | os.PathLike[str]) -> None:
     check_folder(path)
 
 
-def check_folder(path: Path) -> None:
-    """Raise OutputError if no file can be written at `path`."""
-    folder = path.parent
-    if os.path.isdir(path):  # unlike Path.is_dir it does not raise for names that the system cannot have
-        raise OutputError(f"{path}: is a folder; name a file in it")
-    if not os.path.isdir(folder):
-        raise OutputError(f"{path}: there is no folder '{folder}'; create it first")
-    if not os.access(folder, os.W_OK):
-        raise OutputError(f"{path}: the folder '{folder}' is not writable; choose another")
-    if len(os.fsencode(path.name)) > LONGEST_NAME:
-        raise OutputError(f"{path.name[:40]}...: is too long for a file's name; {LONGEST_NAME} bytes are the most")
+def radiance(image: Any, name: str = "image") -> Array:
+    """`image` in double precision, or a SettingError if it is no (H, W, 3) array of finite 32-bit floats.
 
-
-def write_whole(path: Path, write: Callable[[Path], None]) -> None:
-    """Let `write` fill a file beside `path`, then put it in place at once."""
-    part = path.with_name(f".{uuid.uuid4().hex}.part")
-    try:
-        write(part)
-        os.replace(part, path)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
-    finally:
-        part.unlink(missing_ok=True)
+    What is not finite is counted in pixels. Infinity in 32 bits counts as infinity: radiance is stored so.
+    """
+    array = np.asarray(image)
+    if array.dtype.kind != "f":
+        raise SettingError(f"{name}: holds {array.dtype}; wants linear radiance in floats")
+    if array.ndim != 3 or array.shape[2] != 3 or array.size == 0:
+        raise SettingError(f"{name}: has the shape {array.shape}; wants (height, width, 3)")
+    with np.errstate(over="ignore", invalid="ignore"):
+        double = array.astype(np.float64)
+    bad = ~(np.abs(double) <= LARGEST).all(-1)
+    if bad.any():
+        y, x = np.argwhere(bad)[0]
+        which = f"{bad.sum()} of {bad.size} pixels are"
+        raise SettingError(f"{name}: {which} not finite, first x = {x}, y = {y} from the top left; nothing is averaged")
+    return double

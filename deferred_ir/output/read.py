@@ -14,7 +14,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import SettingError, did_you_mean, shown
-from deferred_ir.truth.metrics import radiance
+from deferred_ir.output.image import radiance
 
 SUFFIXES = (".npy", ".exr")
 

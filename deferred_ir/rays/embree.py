@@ -128,3 +128,13 @@ def _embree(positions: Array, faces: Ints) -> Any:
     # The first ray commits Embree's scene, which must not happen in two threads at once.
     scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
     return scene
+
+
+def traces_a_ray() -> bool:
+    """Whether Embree finds a triangle before a ray: it comes compiled, so an import alone proves little.
+
+    Raises DeviceError without embreex.
+    """
+    scene = _embree(np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1]]), np.array([[0, 1, 2]]))
+    found = scene.run(np.array([[0.2, 0.2, 0]], np.float32), np.array([[0, 0, 1]], np.float32), output=1)
+    return bool(found["primID"][0] == 0)

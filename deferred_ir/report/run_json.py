@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from deferred_ir.engine.record import Record
 from deferred_ir.graph.file import graph_hash
 from deferred_ir.graph.graph import Graph, Plan
-from deferred_ir.output.image import write_whole
 from deferred_ir.report import left_out as savings
 from deferred_ir.report import lost_light
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
@@ -85,13 +82,3 @@ def _bias(renderer: Renderer, scene: Scene, graph: Graph, plan: Plan) -> dict[st
     given_back = any(step.work.gives_back for step in plan.steps)
     tracer = renderer.tracer()  # its scene is that of the last frame
     return lost_light.estimate(tracer.scene, tracer, clamp=p.clamp_fraction, fov=p.fov, given_back=given_back)
-
-
-def write(path: Path, data: dict[str, Any]) -> None:
-    """Write JSON whole or not at all."""
-    text = json.dumps(data, indent=1, allow_nan=False) + "\n"
-
-    def fill(part: Path) -> None:
-        part.write_text(text, encoding="utf-8")
-
-    write_whole(path, fill)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array
-from deferred_ir.output.image import write_whole
+from deferred_ir.base.files import write_whole
 from deferred_ir.truth.flip import LUMINANCE
 from deferred_ir.truth.metrics import EPSILON
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools
 from deferred_ir.base.errors import SettingError
+from deferred_ir.output.image import radiance
 from deferred_ir.truth import flip
 from deferred_ir.truth.flip import FlipParameters
 
@@ -29,7 +30,6 @@ EPSILON = 0.01
 """relMSE adds this times mean(R)^2 to R^2, so that dark pixels do not decide alone."""
 TRIMMED = 0.001
 """The part of the pixels, the worst ones, that trimmed relMSE leaves out."""
-LARGEST = float(np.finfo(np.float32).max)
 DARKEST = float(np.finfo(np.float32).tiny)
 NAMES = ("image", "reference")
 
@@ -168,26 +168,6 @@ def rmse(image: Any, reference: Any, hit: Hit = None) -> float:
 def bias(image: Any, reference: Any, hit: Hit = None) -> float:
     """mean(I - R) / mean(R): -0.1 means that a tenth of the light is missing."""
     return _pair(image, reference, hit, NAMES).bias()
-
-
-def radiance(image: Any, name: str = "image") -> Array:
-    """`image` in double precision, or a SettingError if it is no (H, W, 3) array of finite 32-bit floats.
-
-    What is not finite is counted in pixels. Infinity in 32 bits counts as infinity: radiance is stored so.
-    """
-    array = np.asarray(image)
-    if array.dtype.kind != "f":
-        raise SettingError(f"{name}: holds {array.dtype}; wants linear radiance in floats")
-    if array.ndim != 3 or array.shape[2] != 3 or array.size == 0:
-        raise SettingError(f"{name}: has the shape {array.shape}; wants (height, width, 3)")
-    with np.errstate(over="ignore", invalid="ignore"):
-        double = array.astype(np.float64)
-    bad = ~(np.abs(double) <= LARGEST).all(-1)
-    if bad.any():
-        y, x = np.argwhere(bad)[0]
-        which = f"{bad.sum()} of {bad.size} pixels are"
-        raise SettingError(f"{name}: {which} not finite, first x = {x}, y = {y} from the top left; nothing is averaged")
-    return double
 
 
 def _pair(image: Any, reference: Any, hit: Hit, names: tuple[str, str]) -> _Pair:

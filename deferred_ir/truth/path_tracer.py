@@ -7,14 +7,13 @@ its own formula of the spotlight. Pixel centres only, no pixel filter. Each vert
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.base.parallel import in_order
+from deferred_ir.base.parallel import Progress, in_order
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.scene.scene import Scene
 
@@ -22,9 +21,6 @@ MOST_BATCHES = 16
 RAYS = 1 << 13
 """Rays of a task: few enough for their arrays to stay in a core's cache."""
 GOLDEN = (np.sqrt(5) - 1) / 2
-
-Progress = Callable[[int, int], None]
-"""Called with the work done and all there is, in units of their own."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,12 +13,12 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools
 from deferred_ir.base.errors import OutputError, SettingError, did_you_mean
+from deferred_ir.base.files import check_folder, write_json, write_whole
+from deferred_ir.base.parallel import Progress
 from deferred_ir.graph.file import load_graph
-from deferred_ir.output.image import check_folder, write_whole
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.report.run_json import write
 from deferred_ir.scene.scene import Scene
-from deferred_ir.truth.path_tracer import PathTracer, Progress
+from deferred_ir.truth.path_tracer import PathTracer
 from deferred_ir.vpls import sum
 from deferred_ir.vpls.cast import NONE, cast
 
@@ -59,7 +59,7 @@ class Reference:
             with part.open("wb") as file:
                 np.save(file, self.radiance)
             # Last before the image takes its name: so one is not there without the other.
-            write(path.with_suffix(".json"), dict(self.meta))
+            write_json(path.with_suffix(".json"), dict(self.meta))
 
         write_whole(path, fill)
 

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.errors import OutputError
+from deferred_ir.base.files import check_folder, write_whole
 from deferred_ir.graph.file import graph_names
 from deferred_ir.graph.graph import Graph
 from deferred_ir.graph.params import specs
 from deferred_ir.loading import scene_file
 from deferred_ir.loading.scene_file import ModelEntry
-from deferred_ir.output.image import check_folder, write_whole
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.motion import CameraMotion, LissajousMotion, ModelMotion, SpotlightMotion

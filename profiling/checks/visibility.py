@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
+from deferred_ir.base.parallel import Progress
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import graph_hash, load_graph
@@ -24,7 +25,6 @@ from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import NEAR
 from deferred_ir.scene.scene import Scene
 from deferred_ir.shadows.settings import WIDEST_PLANAR, MapParams
-from deferred_ir.truth.path_tracer import Progress
 
 GRAPH = FOLDER / "visibility.toml"
 PASSES = {"visibility_pairs": VisibilityPairs}

@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
 from deferred_ir.base.errors import OutputError
+from deferred_ir.base.files import write_json
 from deferred_ir.profiling.peers.peer import NAMES
-from deferred_ir.report.run_json import write
 
 FOLDER = "peers"
 NOTES = "notes.json"
@@ -68,7 +68,7 @@ def path(folder: Path, key: PeerKey) -> Path:
 
 def save(folder: Path, point: PeerPoint) -> None:
     """Write the point whole."""
-    write(path(folder, point.key), asdict(point))
+    write_json(path(folder, point.key), asdict(point))
 
 
 def read(file: Path) -> PeerPoint | None:
@@ -94,7 +94,7 @@ def make_folder(folder: Path) -> Path:
 
 def save_notes(folder: Path, notes: Mapping[str, str]) -> None:
     """Keep the notes for the report of a merge."""
-    write(make_folder(folder) / NOTES, dict(notes))
+    write_json(make_folder(folder) / NOTES, dict(notes))
 
 
 def merge(

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.errors import SettingError
+from deferred_ir.base.files import write_json
 from deferred_ir.profiling.peers.points import Peers
 from deferred_ir.profiling.report import tables
 from deferred_ir.profiling.report.plot import svg
@@ -17,7 +18,6 @@ from deferred_ir.profiling.sweep import edge_mask, equal_error, points
 from deferred_ir.profiling.sweep.groups import advise, flagged, grouped
 from deferred_ir.profiling.sweep.points import Point
 from deferred_ir.profiling.sweep.reference import SHARE
-from deferred_ir.report.run_json import write
 
 
 def check_libraries() -> None:
@@ -62,10 +62,10 @@ def write_all(folder: Path, found: Sequence[Point], peers: Peers) -> str:
         "peer_notes": dict(peers.notes),
         "equal_error": [row.as_dict() for row in equal],
     }
-    write(folder / "error_vs_time.json", told)
+    write_json(folder / "error_vs_time.json", told)
     plot = svg(compared, first.scene, rungs)
     tables.write_text(folder / "error_vs_time.svg", plot)
-    write(folder / "trace.json", tables.trace(found))
+    write_json(folder / "trace.json", tables.trace(found))
     advice = advise(groups)
     figures = {"groups": groups, "rungs": rungs, "equal": equal, "notes": peers.notes}
     tables.write_text(folder / "report.html", _page(folder, found, about, plot=plot, advice=advice, figures=figures))

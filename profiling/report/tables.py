@@ -9,7 +9,7 @@ from pathlib import Path
 from statistics import median, quantiles
 from typing import Any
 
-from deferred_ir.output.image import write_whole
+from deferred_ir.base.files import write_whole
 from deferred_ir.profiling.peers.points import PeerPoint
 from deferred_ir.profiling.sweep.groups import flagged, noisy
 from deferred_ir.profiling.sweep.points import Point

@@ -13,10 +13,10 @@ from typing import Any
 
 from tqdm import tqdm
 
+from deferred_ir.base.files import write_json
 from deferred_ir.loading.load import load
 from deferred_ir.profiling.measure import arguments, panels
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.report.run_json import write
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.path_tracer import PathTracer
@@ -76,7 +76,7 @@ def main() -> None:
     chosen.output.mkdir(parents=True, exist_ok=True)
     results = {(scene := load(name)).name: measure(scene, chosen.fov) for name in chosen.scenes}
     settings = {"clamps": CLAMPS, "fov": chosen.fov, "seeds": SEEDS, "size": SIZE}
-    write(chosen.output / "clamp.json", {**settings, "relmse": results})
+    write_json(chosen.output / "clamp.json", {**settings, "relmse": results})
     plot(results, chosen.output / "clamp.svg")
     print(table(results))
 

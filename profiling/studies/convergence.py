@@ -18,9 +18,10 @@ from typing import Any
 from tqdm import tqdm
 
 from deferred_ir.base.errors import Error
-from deferred_ir.cli.main import settings as settings_of
+from deferred_ir.base.files import write_json
 from deferred_ir.engine.accumulation import Accumulation
 from deferred_ir.engine.renderer import Renderer
+from deferred_ir.engine.settings import parse_settings as settings_of
 from deferred_ir.loading.load import load
 from deferred_ir.loading.scene_file import parse_size
 from deferred_ir.profiling.measure import bars, panels
@@ -29,7 +30,6 @@ from deferred_ir.profiling.sweep import edge_mask, reference
 from deferred_ir.profiling.sweep.edge_mask import Mask
 from deferred_ir.profiling.sweep.equal_error import TARGETS, Rung, reach, rungs
 from deferred_ir.profiling.sweep.reference import Truth
-from deferred_ir.report.run_json import write
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import masked_relmse
 
@@ -131,7 +131,7 @@ def report(chosen: argparse.Namespace, scene: Scene) -> None:
     lines = {graph: line(scene, graph, size=size, vpls=chosen.vpls, truth=truth, mask=mask) for graph in chosen.graphs}
     course = peer_sweep.Course(scene, size, 1, truth, mask)
     peers = rungs(peer_sweep.run(course, folder, peer_sweep.chosen(chosen.peers)).points)
-    write(folder / "convergence.json", {"vpls": chosen.vpls, "noise": truth.noise, "lines": lines})
+    write_json(folder / "convergence.json", {"vpls": chosen.vpls, "noise": truth.noise, "lines": lines})
     plot(f"{scene.name}, {chosen.vpls} VPLs a frame", lines, peers, folder / f"convergence-{scene.name}.svg")
     print(tables(lines, peers))
     if truth.noise:

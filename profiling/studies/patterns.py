@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from deferred_ir.base.files import write_json
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
 from deferred_ir.profiling.measure import arguments, panels
-from deferred_ir.report.run_json import write
 from deferred_ir.sampling.patterns import PATTERNS
 from deferred_ir.scene.scene import Scene
 
@@ -92,7 +92,7 @@ def main() -> None:
     chosen = arguments(__doc__).parse_args()
     chosen.output.mkdir(parents=True, exist_ok=True)
     results = {(scene := load(name)).name: measure(scene) for name in chosen.scenes}
-    write(chosen.output / "patterns.json", {"counts": COUNTS, "seeds": SEEDS, "size": SIZE, "scenes": results})
+    write_json(chosen.output / "patterns.json", {"counts": COUNTS, "seeds": SEEDS, "size": SIZE, "scenes": results})
     plot(results, chosen.output / "patterns.svg")
     print(table(results))
 

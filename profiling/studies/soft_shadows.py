@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools
+from deferred_ir.base.files import write_json
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.output.image import Image
 from deferred_ir.profiling.measure import panels
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.report.run_json import write
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.geometry import Geometry, Model
 from deferred_ir.scene.lights.spot import Spotlight
@@ -194,7 +194,7 @@ def main() -> None:
     folder = parser.parse_args().output
     folder.mkdir(parents=True, exist_ok=True)
     rows, (told, images) = widths(), errors(scene())
-    write(folder / "soft-shadows.json", {"radius": RADIUS, "widths": rows, **told})
+    write_json(folder / "soft-shadows.json", {"radius": RADIUS, "widths": rows, **told})
     plot(rows, folder / "soft-shadows.svg")
     pictures(images, folder / "soft-shadows-pictures.svg")
     print("| height | rendered | ray-traced |\n|---|---|---|")

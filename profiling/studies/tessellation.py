@@ -17,6 +17,7 @@ from typing import Any
 
 from tqdm import tqdm
 
+from deferred_ir.base.files import write_json
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.frame.frame import Frame
@@ -25,7 +26,6 @@ from deferred_ir.loading.load import load
 from deferred_ir.passes.shadow_maps import ShadowMaps
 from deferred_ir.profiling.checks import visibility
 from deferred_ir.profiling.measure import arguments, panels
-from deferred_ir.report.run_json import write
 from deferred_ir.scene.scene import Scene
 
 GRAPH = Path(__file__).with_suffix(".toml")
@@ -171,7 +171,7 @@ def main() -> None:
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
     rows = [row for name in given.scenes for row in measure(load(name), given.turns, given.pairs)]
-    write(given.output / "tessellation.json", {"vpls": VPLS, "map_size": MAP_SIZE, "rows": rows})
+    write_json(given.output / "tessellation.json", {"vpls": VPLS, "map_size": MAP_SIZE, "rows": rows})
     plot(rows, given.output / "tessellation.svg")
     print(tables(rows))
 

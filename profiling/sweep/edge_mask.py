@@ -17,12 +17,12 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools
 from deferred_ir.base.errors import SettingError
-from deferred_ir.output.image import Image, write_whole
+from deferred_ir.base.files import write_json, write_whole
+from deferred_ir.base.parallel import Progress
+from deferred_ir.output.image import Image
 from deferred_ir.output.read import read_record, record_path
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.report.run_json import write
 from deferred_ir.scene.scene import Scene
-from deferred_ir.truth.path_tracer import Progress
 
 FILE, PICTURE = "mask.npy", "mask.png"
 STEPS = 4
@@ -159,7 +159,7 @@ def save(folder: Path, mask: Mask, scene_hash: str) -> None:
     def fill(part: Path) -> None:
         with part.open("wb") as file:
             np.save(file, mask.kept)
-        write(record_path(folder / FILE), record)
+        write_json(record_path(folder / FILE), record)
 
     write_whole(folder / FILE, fill)
 

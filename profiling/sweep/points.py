@@ -11,9 +11,8 @@ from statistics import median
 from typing import Any
 
 from deferred_ir.base.errors import OutputError
-from deferred_ir.output.image import write_whole
+from deferred_ir.base.files import write_json, write_whole
 from deferred_ir.report.left_out import LeftOut
-from deferred_ir.report.run_json import write
 
 FOLDER = "points"
 PICTURES = (".png", ".error.png")
@@ -87,7 +86,7 @@ def path(folder: Path, name: str, suffix: str = ".json") -> Path:
 
 def save(folder: Path, point: Point) -> None:
     """Write the point whole; its pictures have to be there by then."""
-    write(path(folder, point.key.name), asdict(point))
+    write_json(path(folder, point.key.name), asdict(point))
 
 
 def read(folder: Path, name: str) -> Point | None:

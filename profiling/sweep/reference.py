@@ -12,12 +12,11 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import SettingError
-from deferred_ir.output.image import write_whole
+from deferred_ir.base.files import write_json, write_whole
+from deferred_ir.base.parallel import Progress
 from deferred_ir.output.read import read_radiance, read_record, record_path
-from deferred_ir.report.run_json import write
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
-from deferred_ir.truth.path_tracer import Progress
 from deferred_ir.truth.reference import reference
 
 FILE = "reference.npy"
@@ -138,7 +137,7 @@ def _save(folder: Path, truth: Truth) -> None:
     def fill(part: Path) -> None:
         with part.open("wb") as stream:
             np.save(stream, np.asarray(truth.radiance, np.float32))
-        write(record_path(file), {**truth.record, "image_hash": truth.hash})
+        write_json(record_path(file), {**truth.record, "image_hash": truth.hash})
 
     write_whole(file, fill)
 

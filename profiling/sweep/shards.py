@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from deferred_ir.base.errors import SettingError
-from deferred_ir.output.image import write_whole
+from deferred_ir.base.files import write_whole
 from deferred_ir.profiling.peers import points as peer_points
 from deferred_ir.profiling.peers.points import Peers
 from deferred_ir.profiling.sweep import edge_mask, points

@@ -11,7 +11,8 @@ import PIL.Image
 import pytest
 
 from deferred_ir.base.errors import OutputError
-from deferred_ir.output.image import Image, check_path, write_whole
+from deferred_ir.base.files import write_whole
+from deferred_ir.output.image import Image, check_path
 
 RNG = np.random.default_rng(0)
 RADIANCE = (RNG.random((5, 7, 3)) * 10.0 ** RNG.integers(-6, 6, (5, 7, 3))).astype(np.float32)

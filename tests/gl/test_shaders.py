@@ -86,7 +86,7 @@ def test_the_first_folder_wins(folder):
 def test_a_missing_include_names_the_line_and_the_nearest_file(folder):
     write(folder, "a.frag", '#include "lib/b.glsl"\n')
     write(folder, "lib/b.glsl", '\n#include "lib/ligth.glsl"\n')
-    write(folder, "lib/lights/light.glsl", "")
+    write(folder, "lib/light.glsl", "")
     with pytest.raises(ShaderError, match=r"^lib/b\.glsl:2: no shader file 'lib/ligth\.glsl'; did you mean 'lib/light"):
         flatten("a.frag", [folder], {})
 

@@ -13,12 +13,13 @@ import os
 import pkgutil
 import tomllib
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.errors import GraphError, did_you_mean, shown
 from deferred_ir.base.toml_tables import DEEPEST, too_deep
-from deferred_ir.graph import params
+from deferred_ir.graph import former_names, params
 from deferred_ir.graph.graph import Graph, Node, Pass
 
 PASSES = "deferred_ir.passes"
@@ -41,11 +42,12 @@ def load_graph(
     `passes` are the caller's own pass classes by type name. Raises one GraphError that lists all faults of the file.
     """
     path = _find(str(name), None)
-    table = _read(path, ())
+    passes = passes or {}
+    table = _read(path, (), passes)
     faults: list[str] = []
     tables = table.get("passes", {})
-    _apply(tables, settings or {}, faults)
-    nodes = {n: node for n, t in tables.items() if (node := _node(n, t, passes or {}, faults))}
+    _apply(tables, settings or {}, passes, faults)
+    nodes = {n: node for n, t in tables.items() if (node := _node(n, t, passes, faults))}
     outputs = table.get("outputs", {})
     if not isinstance(outputs, dict) or not all(isinstance(source, str) for source in outputs.values()):
         faults.append('outputs: wants name = "pass.port" lines')
@@ -82,9 +84,11 @@ def graph_hash(graph: Graph) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def pass_types() -> list[str]:
+@cache
+def pass_types() -> tuple[str, ...]:
     """Names of the passes that come with the package."""
-    return sorted(m.name for m in pkgutil.iter_modules(importlib.import_module(PASSES).__path__) if not m.ispkg)
+    names = sorted(m.name for m in pkgutil.iter_modules(importlib.import_module(PASSES).__path__) if not m.ispkg)
+    return tuple(names)
 
 
 def _graphs_folder() -> Path:
@@ -103,7 +107,7 @@ def _find(name: str, beside: Path | None) -> Path:
     raise GraphError(f"graph '{name}': no such graph{did_you_mean(name, graph_names())}")
 
 
-def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
+def _read(path: Path, above: tuple[Path, ...], passes: Mapping[str, type[Pass]]) -> dict[str, Any]:
     """The file's tables over those of the file that it extends."""
     if path.resolve() in above:
         raise GraphError(
@@ -120,17 +124,43 @@ def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     if not isinstance(table.get("passes", {}), dict):
         raise GraphError(f"{path.name}: passes: wants a table [passes.NAME] for each pass")
     if "extends" not in table:
-        return table
+        return _with_new_names(path, table, {}, passes)
     if not isinstance(table["extends"], str):
         raise GraphError(f"{path.name}: extends: wants the name or path of a graph")
-    base = _read(_find(table["extends"], path.parent), (*above, path.resolve()))
+    base = _read(_find(table["extends"], path.parent), (*above, path.resolve()), passes)
     removed = [name for name, value in table.get("passes", {}).items() if value is False]
     for name in removed:
         if name not in base.get("passes", {}):
             known = base.get("passes", {})
             raise GraphError(f"{path.name}: passes.{name}: nothing to remove{did_you_mean(name, known)}")
         del base["passes"][name], table["passes"][name]
+    table = _with_new_names(path, table, base, passes)
     return _cut(_overlay(base, {key: value for key, value in table.items() if key != "extends"}))
+
+
+def _with_new_names(
+    path: Path, table: dict[str, Any], base: Mapping[str, Any], passes: Mapping[str, type[Pass]]
+) -> dict[str, Any]:
+    """`table`, to be laid over `base`, with parameters that have moved to other passes set there."""
+    own = {name: entry for name, entry in table.get("passes", {}).items() if isinstance(entry, dict)}
+    values = {(name, key): value for name, entry in own.items() for key, value in entry.items() if key not in RESERVED}
+    faults: list[str] = []
+    tables = _overlay(base.get("passes", {}), own)
+    renamed = former_names.rename(values, _kinds(tables), lambda kind: _params(kind, passes), faults)
+    if faults:
+        raise GraphError(f"{path.name}: {' '.join('; '.join(faults).split())}")
+    if renamed == values:
+        return table
+    fixed = {name: {k: v for k, v in entry.items() if (name, k) not in values} for name, entry in own.items()}
+    for (name, key), value in renamed.items():
+        fixed.setdefault(name, {})[key] = value
+    return {**table, "passes": {**table["passes"], **fixed}}
+
+
+def _kinds(tables: Mapping[str, Any]) -> dict[str, str]:
+    """The type of pass of each node whose table names one that can be."""
+    kinds = {name: entry.get("type", name) for name, entry in tables.items() if isinstance(entry, dict)}
+    return {name: kind for name, kind in kinds.items() if isinstance(kind, str)}
 
 
 def _overlay(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
@@ -153,16 +183,40 @@ def _cut(table: dict[str, Any]) -> dict[str, Any]:
     return table
 
 
-def _apply(tables: dict[str, Any], settings: Mapping[str, Any], faults: list[str]) -> None:
+def _apply(
+    tables: dict[str, Any], settings: Mapping[str, Any], passes: Mapping[str, type[Pass]], faults: list[str]
+) -> None:
     """Lay `pass.param` settings over the tables of the passes."""
+    values = {}
     for key, value in settings.items():
-        name, dot, parameter = key.partition(".")
-        if not dot or parameter in RESERVED:
+        node, dot, name = key.partition(".")
+        if not dot or name in RESERVED:
             faults.append(f"set {key}: wants pass.param = value")
-        elif not isinstance(tables.get(name), dict):
-            faults.append(f"set {key}: no pass '{name}' in this graph{did_you_mean(name, tables)}")
         else:
-            tables[name][parameter] = value
+            values[node, name] = value
+    contradictions: list[str] = []
+    values = former_names.rename(values, _kinds(tables), lambda kind: _params(kind, passes), contradictions)
+    faults += [f"set {fault}" for fault in contradictions]
+    for (node, name), value in values.items():
+        if isinstance(tables.get(node), dict):
+            tables[node][name] = value
+        else:
+            faults.append(f"set {node}.{name}: no pass '{node}' in this graph{did_you_mean(node, tables)}")
+
+
+def _pass(kind: str, passes: Mapping[str, type[Pass]]) -> type[Pass] | None:
+    """The class of passes of type `kind`, the caller's own first; None if there is none."""
+    if kind in passes:
+        return passes[kind]
+    if kind not in pass_types():
+        return None
+    found: type[Pass] = importlib.import_module(f"{PASSES}.{kind}").PASS
+    return found
+
+
+def _params(kind: str, passes: Mapping[str, type[Pass]]) -> type | None:
+    found = _pass(kind, passes)
+    return None if found is None else found.Params
 
 
 def _node(name: str, table: Any, passes: Mapping[str, type[Pass]], faults: list[str]) -> Node | None:
@@ -176,11 +230,8 @@ def _node(name: str, table: Any, passes: Mapping[str, type[Pass]], faults: list[
     if not isinstance(inputs, dict) or not all(isinstance(source, str) for source in inputs.values()):
         faults.append(f'passes.{name}.inputs: wants {{ port = "pass.port" }}')
         return None
-    if kind in passes:
-        work = passes[kind]
-    elif kind in pass_types():
-        work = importlib.import_module(f"{PASSES}.{kind}").PASS
-    else:
+    work = _pass(kind, passes)
+    if work is None:
         faults.append(f"passes.{name}: no pass type '{kind}'{did_you_mean(kind, [*pass_types(), *passes])}")
         return None
     values = {key: value for key, value in table.items() if key not in RESERVED}

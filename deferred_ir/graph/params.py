@@ -15,9 +15,15 @@ from typing import Any, Literal, get_args, get_type_hints
 from deferred_ir.base.errors import did_you_mean, shown
 
 
-def param(default: Any, *, doc: str, lo: float | None = None, hi: float | None = None) -> Any:
-    """A dataclass field that is a parameter: its default, its inclusive range and one sentence about it."""
-    return field(default=default, metadata={"doc": doc, "lo": lo, "hi": hi})
+def param(
+    default: Any, *, doc: str, lo: float | None = None, hi: float | None = None, formerly: str | None = None
+) -> Any:
+    """A dataclass field that is a parameter: its default, its inclusive range and one sentence about it.
+
+    formerly: its name when it was another pass's, `old_pass.old_param`, which is still accepted.
+    """
+    moved = {} if formerly is None else {"formerly": formerly}
+    return field(default=default, metadata={"doc": doc, "lo": lo, "hi": hi, **moved})
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from test_scene_file import toml
 
 from deferred_ir.base.errors import GraphError
-from deferred_ir.graph import file
+from deferred_ir.graph import file, former_names
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import graph_hash, graph_names, load_graph
-from deferred_ir.graph.graph import Facts, Input, Output, Pass, Texture
+from deferred_ir.graph.graph import Facts, Graph, Input, Output, Pass, Texture
 from deferred_ir.graph.params import param, specs
 
 SMALL = """
@@ -47,7 +47,19 @@ class Blur(Pass):
         return {"out": Output("", Texture("rgba8"))}
 
 
-OWN = {"blur": Blur}
+@dataclass(frozen=True)
+class SplitParams:
+    width: float = param(1.0, lo=0.0, hi=9.0, doc="Width.", formerly="blur.size")
+    shape: int = param(0, doc="Shape.", formerly="end.shape")
+
+
+class Split(Blur):
+    """A pass to which parameters of `blur` and of the node `end` have moved."""
+
+    Params = SplitParams
+
+
+OWN = {"blur": Blur, "split": Split}
 
 
 def write(folder: Path, text: str, name: str = "own.toml") -> Path:
@@ -284,6 +296,72 @@ def test_settings_are_laid_over_the_file(tmp_path):
 )
 def test_each_fault_of_a_setting_is_told(tmp_path, key, value, message):
     assert message in fault(tmp_path, SMALL, {key: value})
+
+
+# Parameters that have moved to another pass
+
+MOVED = """
+[passes.middle]
+type = "split"
+[passes.other]
+type = "split"
+width = 4.0
+"""
+
+
+@pytest.fixture(autouse=True)
+def forget_notes():
+    former_names._note.cache_clear()
+
+
+def widths(graph: Graph) -> list[float]:
+    return [graph.nodes[name].work.params.width for name in ("middle", "other")]
+
+
+@pytest.mark.parametrize("former", ["start.size", "blur.size", "end.size"])
+def test_a_setting_under_a_former_name_reaches_all_nodes_that_have_the_parameter_now(tmp_path, caplog, former):
+    graph = load_graph(write(tmp_path, SMALL + MOVED), {former: 3}, OWN)
+    assert widths(graph) == [3.0, 3.0]
+    assert caplog.messages == [f"{former} has moved: write {name}.width" for name in ("middle", "other")]
+    load_graph(write(tmp_path, SMALL + MOVED), {former: 3}, OWN)
+    assert len(caplog.messages) == 2
+
+
+def test_a_former_name_can_be_that_of_a_node(tmp_path, caplog):
+    graph = load_graph(write(tmp_path, SMALL + MOVED), {"end.shape": 3}, OWN)
+    assert graph.nodes["middle"].work.params.shape == 3
+    assert "end.shape has moved: write middle.shape" in caplog.messages
+    assert "no such parameter" in fault(tmp_path, SMALL + MOVED, {"start.shape": 3})
+
+
+def test_a_file_may_use_former_names_and_is_laid_over_what_it_extends(tmp_path, caplog):
+    write(tmp_path, SMALL + MOVED, "base.toml")
+    graph = load_graph(write(tmp_path, 'extends = "base.toml"\n[passes.end]\nsize = 2\nradius = 5\n'), {}, OWN)
+    assert widths(graph) == [2.0, 2.0]
+    assert graph.nodes["end"].work.params.radius == 5.0
+    assert dict(graph.nodes["end"].inputs) == {"image": "start.out"}
+    assert "end.size has moved: write middle.width" in caplog.messages
+    graph = load_graph(tmp_path / "own.toml", {"middle.width": 6, "end.radius": 1}, OWN)
+    assert widths(graph) == [6.0, 2.0]
+    assert load_graph(write(tmp_path, SMALL + "size = 2\n" + MOVED.replace("width = 4.0", ""), "whole.toml"), {}, OWN)
+
+
+def test_what_extends_a_file_with_former_names_wins_over_them(tmp_path):
+    write(tmp_path, SMALL + "size = 2\n" + MOVED.replace("width = 4.0", ""), "base.toml")
+    graph = load_graph(write(tmp_path, 'extends = "base.toml"\n[passes.middle]\nwidth = 7\n'), {}, OWN)
+    assert widths(graph) == [7.0, 2.0]
+
+
+def test_values_under_a_former_and_the_present_name_must_agree(tmp_path):
+    told = fault(tmp_path, SMALL + MOVED, {"end.size": 3, "other.width": 4})
+    assert "set end.size: is other.width by now, which has another value; remove one of them" in told
+    assert "middle" not in told
+    assert widths(load_graph(tmp_path / "own.toml", {"end.size": 3, "other.width": 3}, OWN)) == [3.0, 3.0]
+    assert "end.size: is other.width by now" in fault(tmp_path, SMALL + "size = 2\n" + MOVED)
+
+
+def test_a_value_under_a_former_name_is_checked(tmp_path):
+    assert "middle.width: is 'x', but wants a number" in fault(tmp_path, SMALL + MOVED, {"end.size": "x"})
 
 
 # Hash

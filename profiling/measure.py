@@ -1,16 +1,14 @@
-"""What the measurements share: progress bars, a row of panels, and files that are the same for the same figures."""
+"""What the measurements share: a row of panels, and files that are the same for the same figures."""
 
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.files import write_whole
-from deferred_ir.base.parallel import Progress
 
 
 def arguments(doc: str | None, output: bool = True) -> argparse.ArgumentParser:
@@ -48,28 +46,3 @@ def panels(names: Iterable[str], path: Path, y_label: str = "", share_y: bool = 
     figure.tight_layout()
     write_whole(path, lambda part: figure.savefig(part, format="svg", metadata={"Date": None}))
     plt.close(figure)
-
-
-@contextmanager
-def bars() -> Iterator[Callable[[str], Progress]]:
-    """Progress bars on a terminal, one for each name that is given."""
-    from tqdm import tqdm
-
-    shown: list[Any] = []
-
-    def begin(name: str) -> Progress:
-        for bar in shown:
-            bar.close()
-        shown.append(tqdm(desc=name, disable=not sys.stderr.isatty(), file=sys.stderr))
-
-        def progress(done: int, total: int) -> None:
-            shown[-1].total = total
-            shown[-1].update(done - shown[-1].n)
-
-        return progress
-
-    try:
-        yield begin
-    finally:
-        for bar in shown:
-            bar.close()

@@ -1,4 +1,4 @@
-"""Work on threads with the results in order, so that sums do not depend on the number of threads; and its progress."""
+"""Work on threads with the results in order, so that sums do not depend on the number of threads."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ from typing import TypeVar
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-
-Progress = Callable[[int, int], None]
-"""Called with the work done and all there is, in units of their own."""
 
 AHEAD = 4
 """Tasks begun for each thread before their results are taken: enough to keep all busy, with few results in memory."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.errors import SettingError, did_you_mean
-from deferred_ir.base.parallel import Progress
+from deferred_ir.base.progress import Progress
 from deferred_ir.engine.settings import chosen_size, notes
 from deferred_ir.loading.load import load
 from deferred_ir.truth import reference as references

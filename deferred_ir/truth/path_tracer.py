@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.base.parallel import Progress, in_order
+from deferred_ir.base.parallel import in_order
+from deferred_ir.base.progress import Progress
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.scene.scene import Scene
 

@@ -14,7 +14,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Bools
 from deferred_ir.base.errors import OutputError, SettingError, did_you_mean
 from deferred_ir.base.files import check_folder, write_json, write_whole
-from deferred_ir.base.parallel import Progress
+from deferred_ir.base.progress import Progress
 from deferred_ir.graph.file import load_graph
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene

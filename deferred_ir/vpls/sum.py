@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from deferred_ir.base.arrays import Array
-from deferred_ir.base.parallel import Progress, in_order
+from deferred_ir.base.parallel import in_order
+from deferred_ir.base.progress import Progress
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.scene.lights.spot import one_minus_cos
 from deferred_ir.vpls.cast import Vpls

@@ -21,9 +21,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 import deferred_ir as ir
+from deferred_ir.base.progress import progress_bar
 from deferred_ir.engine.record import Record
 from deferred_ir.profiling.measure import markdown
 from deferred_ir.scene.motion import FRAMES_PER_SECOND, LissajousMotion
@@ -182,9 +181,9 @@ def main() -> int:
     chosen = parser.parse_args()
     done = Soak()
     try:
-        with tqdm(total=chosen.frames, unit="frame", disable=None) as bar:
+        with progress_bar("frames", chosen.frames, unit="frame") as bar:
             for done in soak(chosen.frames, chosen.loads, 60 * chosen.minutes):
-                bar.update(done.frames - bar.n)
+                bar.show(done.frames, chosen.frames)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
     if len(done.counts) < 2:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.base.parallel import Progress
+from deferred_ir.base.progress import Progress
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import graph_hash, load_graph

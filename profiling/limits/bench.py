@@ -20,9 +20,8 @@ from pathlib import Path
 from statistics import median, quantiles
 from typing import Any
 
-from tqdm import tqdm
-
 from deferred_ir.base.errors import Error
+from deferred_ir.base.progress import track
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.gl.context import Gpu
@@ -75,7 +74,7 @@ def take_turns(
         }
         for graph, renderer in renderers.items():
             renderer.draw(scene, plans[graph])
-        for turn in tqdm(range(turns), desc=scene.name, disable=None):
+        for turn in track(range(turns), scene.name):
             for graph in graphs if turn % 2 == 0 else reversed(graphs):
                 renderers[graph].draw(scene, plans[graph], seed=turn, record=records[graph])
         for graph, renderer in renderers.items():

@@ -11,6 +11,7 @@ from pathlib import Path
 from statistics import mean
 
 from deferred_ir.base.errors import Error, SettingError, did_you_mean
+from deferred_ir.base.progress import progress_bar
 from deferred_ir.profiling.peers import points as peer_points
 from deferred_ir.profiling.peers import process as peer_process
 from deferred_ir.profiling.peers.peer import NAMES
@@ -92,13 +93,10 @@ def run(course: Course, folder: Path, names: Sequence[str]) -> Peers:
 
 def _measured(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
     """The rungs of one peer; its process starts at the first that is not on disk."""
-    from tqdm import tqdm
-
     log = peer_points.make_folder(folder) / f"{name}.log"
-    style = "{desc} {percentage:3.0f}%|{bar}| {elapsed}{postfix}"
     with (
         ExitStack() as stack,
-        tqdm(total=BUDGET, bar_format=style, disable=not sys.stderr.isatty(), file=sys.stderr) as bar,
+        progress_bar(total=BUDGET, at_most=True) as bar,
     ):
         process: peer_process.PeerProcess | None = None
 
@@ -107,14 +105,13 @@ def _measured(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
             key = course.key(name, spp, seed)
             point = peer_points.read(peer_points.path(folder, key))
             if point is None or (point.reference, point.mask) != (course.truth.hash, course.mask.hash):
-                bar.set_description(f"{name}, {spp} paths, seed {seed}")
+                bar.label(f"{name}, {spp} paths, seed {seed}")
                 if process is None:
                     made = peer_process.PeerProcess(name, course.scene, course.size, course.bounces, log)
                     process = stack.enter_context(made)
                 point = _point(course, key, process)
                 peer_points.save(folder, point)
-            bar.update(min(point.ms, BUDGET - bar.n))
-            bar.set_postfix_str(f"at most {tqdm.format_interval((BUDGET - bar.n) / 1e3)} left")
+            bar.advance(point.ms)
             return point
 
         yield from climb(measure, course.seeds)

@@ -15,9 +15,9 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from deferred_ir.base.errors import Error
+from deferred_ir.base.progress import track
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
@@ -66,7 +66,7 @@ def measure(
             renderer = stack.enter_context(Renderer(size, "accurate", set=chosen))
             runs[name] = Run(renderer, renderer.plan(scene, vpls, ["radiance"]))
             renderer.draw(scene, runs[name].plan, seed=seeds)  # compiles, allocates: not what a frame costs
-        for seed in tqdm(range(seeds), desc=f"{scene.name}, {table}", disable=None):
+        for seed in track(range(seeds), f"{scene.name}, {table}"):
             for run in runs.values():
                 run.renderer.draw(scene, run.plan, seed=seed, record=run.record)
                 run.errors.append(relmse(run.renderer.read(run.plan).radiance, image, hit)[0])

@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
+from deferred_ir.base.progress import track
 from deferred_ir.loading.load import load
 from deferred_ir.loading.scene_file import parse_size
 from deferred_ir.profiling.measure import arguments
@@ -41,7 +41,7 @@ def measure(scene: Scene, size: tuple[int, int], clamp: float, fov: float) -> di
     if traced.variance is None:
         raise ValueError(f"{SPP} paths a pixel tell no variance")
     sums = []
-    for seed in tqdm(range(SCRAMBLES), desc=scene.name, disable=None):
+    for seed in track(range(SCRAMBLES), scene.name):
         vpls = cast(scene.spotlight, tracer, COUNT, "sobol", seed)
         sums.append(blocks(sum.indirect(tracer, seen, vpls, fov=fov, clamp=clamp).reshape(traced.indirect.shape)))
     ours, paths = np.array(sums), blocks(traced.indirect)

@@ -11,9 +11,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from deferred_ir.base.files import write_json
+from deferred_ir.base.progress import progress_bar
 from deferred_ir.loading.load import load
 from deferred_ir.profiling.measure import arguments, panels
 from deferred_ir.rays.tracer import Tracer
@@ -37,7 +36,7 @@ def measure(scene: Scene, fov: float) -> dict[str, list[float]]:
     truth = judge.estimate(SIZE, SPP)
     seen, reference = judge.seen(SIZE), truth.direct + truth.indirect
     errors = {str(count): [0.0] * len(CLAMPS) for count in COUNTS}
-    with tqdm(total=len(COUNTS) * SEEDS * len(CLAMPS), desc=scene.name, disable=None) as bar:
+    with progress_bar(scene.name, len(COUNTS) * SEEDS * len(CLAMPS)) as bar:
         for count in COUNTS:
             for seed in range(SEEDS):
                 vpls = cast(scene.spotlight, tracer, count, "sobol", seed)
@@ -45,7 +44,7 @@ def measure(scene: Scene, fov: float) -> dict[str, list[float]]:
                     indirect = sum.indirect(tracer, seen, vpls, fov=fov, clamp=clamp)
                     image = truth.direct + indirect.reshape(reference.shape)
                     errors[str(count)][i] += relmse(image, reference, truth.hit)[0] / SEEDS
-                    bar.update()
+                    bar.advance()
     return errors
 
 

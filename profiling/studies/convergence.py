@@ -15,16 +15,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
 from deferred_ir.base.errors import Error
 from deferred_ir.base.files import write_json
+from deferred_ir.base.progress import progress_bar, track
 from deferred_ir.engine.accumulation import Accumulation
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.engine.settings import parse_settings as settings_of
 from deferred_ir.loading.load import load
 from deferred_ir.loading.scene_file import parse_size
-from deferred_ir.profiling.measure import bars, panels
+from deferred_ir.profiling.measure import panels
 from deferred_ir.profiling.peers import ladder as peer_sweep
 from deferred_ir.profiling.sweep import edge_mask, reference
 from deferred_ir.profiling.sweep.edge_mask import Mask
@@ -47,7 +46,7 @@ def line(scene: Scene, graph: str, *, size: tuple[int, int], vpls: int, truth: T
         renderer.draw(scene, plan, seed=1)  # compiles, allocates: not what a frame costs
         mean = Accumulation(renderer, scene, plan)
         spent = 0.0
-        for frame in tqdm(range(1, FRAMES[-1] + 1), desc=f"{scene.name}, {graph}", disable=None):
+        for frame in track(range(1, FRAMES[-1] + 1), f"{scene.name}, {graph}"):
             start = clock.perf_counter()
             mean.draw()
             spent += clock.perf_counter() - start
@@ -122,12 +121,11 @@ def report(chosen: argparse.Namespace, scene: Scene) -> None:
             with Renderer(size, name, set=settings) as renderer:
                 images.append(renderer.render(scene, vpls=chosen.vpls, accumulate=FRAMES[-1]).radiance)
         sweep = {"convergence": chosen.graphs}
-        with bars() as bar:
-            truth = reference.made(
-                folder, scene, size, sweep, images=lambda: images, progress=lambda spp: bar(f"reference, {spp} paths")
-            )
-    with bars() as bar:
-        mask = edge_mask.made(folder, scene, size, progress=lambda: bar("edges"))
+        with progress_bar() as bar:
+            truth = reference.made(folder, scene, size, sweep, images=lambda: images, bar=bar)
+    with progress_bar() as bar:
+        bar.label("edges")
+        mask = edge_mask.made(folder, scene, size, bar.show)
     lines = {graph: line(scene, graph, size=size, vpls=chosen.vpls, truth=truth, mask=mask) for graph in chosen.graphs}
     course = peer_sweep.Course(scene, size, 1, truth, mask)
     peers = rungs(peer_sweep.run(course, folder, peer_sweep.chosen(chosen.peers)).points)

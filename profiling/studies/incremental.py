@@ -16,9 +16,9 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from deferred_ir.base.arrays import Array, Bools
+from deferred_ir.base.progress import track
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
@@ -77,7 +77,7 @@ def times(scene: Scene, size: tuple[int, int]) -> dict[str, Any]:
         plans = {one: one.plan(scene, VPLS) for one in (kept, redone)}
         records = {one: Record() for one in plans}
         redone.draw(scene, plans[redone])
-        for frame in tqdm(range(WARM + MOVING), desc=f"{scene.name}, times", disable=None):
+        for frame in track(range(WARM + MOVING), f"{scene.name}, times"):
             measured = frame >= WARM
             for one, plan in plans.items():
                 if measured or one is kept:
@@ -105,7 +105,7 @@ def errors(scene: Scene, size: tuple[int, int]) -> dict[str, float]:
     truth = reference(scene, size, spp=PATHS).radiance
     with Renderer(size, "incremental") as kept, Renderer(size, "interleaved") as fresh:
         plan, found = kept.plan(scene, VPLS), dict[str, list[float]](kept=[], sobol=[])
-        for seed in tqdm(range(SEEDS), desc=f"{scene.name}, errors", disable=None):
+        for seed in track(range(SEEDS), f"{scene.name}, errors"):
             for _ in range(WARM):
                 kept.draw(scene, plan, seed=seed)
             image = kept.read(plan).radiance
@@ -128,7 +128,7 @@ def flicker(scene: Scene, size: tuple[int, int]) -> dict[str, float]:
         )
         plan, series = kept.plan(scene, VPLS), dict[str, list[Array]](kept=[], sobol=[], random=[])
         bright = []
-        for frame in tqdm(range(WARM + MOVING), desc=f"{scene.name}, flicker", disable=None):
+        for frame in track(range(WARM + MOVING), f"{scene.name}, flicker"):
             time = frame / FRAMES_PER_SECOND
             kept.draw(scene, plan, time=time)
             if frame >= WARM:
@@ -190,7 +190,7 @@ def behind(scene: Scene, size: tuple[int, int]) -> dict[str, float]:
         )
         plans = {one: one.plan(scene, VPLS) for one in (kept, whole)}
         found = dict[str, list[float]](kept=[], whole=[], sobol=[])
-        for frame in tqdm(range(2 * WARM + MOVING), desc=f"{scene.name}, behind", disable=None):
+        for frame in track(range(2 * WARM + MOVING), f"{scene.name}, behind"):
             time = frame / FRAMES_PER_SECOND
             kept.draw(scene, plans[kept], time=time)
             if frame < 2 * WARM:

@@ -14,9 +14,9 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from deferred_ir.base.arrays import Array
+from deferred_ir.base.progress import track
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
@@ -47,7 +47,7 @@ def compare(scene: Scene, vpls: int) -> list[dict[str, Any]]:
         plans = {n: one.plan(scene, vpls, ["radiance"]) for n, one in renderers.items()}
         images = {n: one.render(scene, vpls=vpls).radiance for n, one in renderers.items()}
         records = {n: Record() for n in renderers}
-        for _ in tqdm(range(TURNS), desc=f"{scene.name}, {vpls} VPLs", disable=None):
+        for _ in track(range(TURNS), f"{scene.name}, {vpls} VPLs"):
             for n, one in renderers.items():
                 one.draw(scene, plans[n], record=records[n])
         for n, one in renderers.items():

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
+from deferred_ir.base.progress import track
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
 from deferred_ir.loading.scene_file import parse_size
@@ -31,7 +31,7 @@ def measure(
     with Renderer(size, graph) as renderer:
         cone = {"vpl.fov": renderer.graph().nodes["vpl"].work.params.fov}
         plan = renderer.plan(scene, vpls, ["radiance"])
-        for seed in tqdm(range(seeds), desc=scene.name, disable=None):
+        for seed in track(range(seeds), scene.name):
             renderer.draw(scene, plan, seed=seed)
             mapped = renderer.read(plan).radiance
             traced = reference(scene, size, vpls=vpls, seed=seed, settings=cone)

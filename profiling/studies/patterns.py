@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
 from deferred_ir.base.files import write_json
+from deferred_ir.base.progress import ProgressBar, progress_bar
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
 from deferred_ir.profiling.measure import arguments, panels
@@ -27,7 +27,7 @@ SEEDS = 8
 LIMIT_COUNT, LIMIT_SEEDS = 1024, 32
 
 
-def _images(scene: Scene, pattern: str, count: int, seeds: range, bar: tqdm) -> np.ndarray:
+def _images(scene: Scene, pattern: str, count: int, seeds: range, bar: ProgressBar) -> np.ndarray:
     """Radiance of each seed, float64 (seeds, H, W, 3)."""
     images = []
     with Renderer(SIZE, set={"vpl.pattern": pattern}) as renderer:
@@ -35,14 +35,14 @@ def _images(scene: Scene, pattern: str, count: int, seeds: range, bar: tqdm) -> 
         for seed in seeds:
             renderer.draw(scene, plan, seed=seed)
             images.append(renderer.read(plan).radiance.astype(np.float64))
-            bar.update(count)
+            bar.advance(count)
     return np.array(images)
 
 
 def measure(scene: Scene) -> dict[str, Any]:
     """RMSE over the mean of the limit, for each pattern, count and seed; and the slope of its mean in log-log."""
     total = LIMIT_COUNT * LIMIT_SEEDS + len(PATTERNS) * SEEDS * sum(COUNTS)
-    with tqdm(total=total, unit="vpl", desc=scene.name, disable=None) as bar:
+    with progress_bar(scene.name, total) as bar:
         # Seeds of the limit are none of those that are held against it.
         limits = _images(scene, "sobol", LIMIT_COUNT, range(1000, 1000 + LIMIT_SEEDS), bar)
         limit = limits.mean(axis=0)

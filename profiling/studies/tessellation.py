@@ -15,9 +15,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from tqdm import tqdm
-
 from deferred_ir.base.files import write_json
+from deferred_ir.base.progress import track
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.frame.frame import Frame
@@ -82,7 +81,7 @@ def costs(scene: Scene, chosen: Sequence[Mapping[str, Any]], turns: int) -> list
         records = [Record() for _ in renderers]
         for one, plan in zip(renderers, plans, strict=True):
             one.draw(scene, plan)
-        for turn in tqdm(range(turns), desc=scene.name, disable=None):
+        for turn in track(range(turns), scene.name):
             for one, plan, record in zip(renderers, plans, records, strict=True):
                 one.draw(scene, plan, seed=turn, record=record)
         for one, record in zip(renderers, records, strict=True):

@@ -8,7 +8,6 @@ neighbours of the lattice differ in surface, albedo or light the pixel does not 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Bools
 from deferred_ir.base.errors import SettingError
 from deferred_ir.base.files import write_json, write_whole
-from deferred_ir.base.parallel import Progress
+from deferred_ir.base.progress import Progress
 from deferred_ir.output.image import Image
 from deferred_ir.output.read import read_record, record_path
 from deferred_ir.rays.tracer import Tracer
@@ -141,11 +140,11 @@ def _differ(one: _Lattice, other: _Lattice) -> Bools:
     return differ
 
 
-def made(folder: Path, scene: Scene, size: tuple[int, int], progress: Callable[[], Progress]) -> Mask:
+def made(folder: Path, scene: Scene, size: tuple[int, int], progress: Progress | None = None) -> Mask:
     """The mask kept in `folder`, or a new one, kept there."""
     mask = read(folder, scene.hash, size)
     if mask is None:
-        mask = found(scene, size, progress())
+        mask = found(scene, size, progress)
         save(folder, mask, scene.hash)
     return mask
 

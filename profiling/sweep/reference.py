@@ -13,7 +13,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import SettingError
 from deferred_ir.base.files import write_json, write_whole
-from deferred_ir.base.parallel import Progress
+from deferred_ir.base.progress import ProgressBar
 from deferred_ir.output.read import read_radiance, read_record, record_path
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
@@ -84,20 +84,20 @@ def made(
     sweep: Mapping[str, Any],
     *,
     images: Callable[[], Sequence[Array]],
-    progress: Callable[[int], Progress],
+    bar: ProgressBar,
 ) -> Truth:
     """The reference kept in `folder`, or a new one: paths are doubled until its noise is a tenth of the errors.
 
     sweep: what decides how good it has to be; kept in the record, so that a sweep that goes on needs no second look.
-    images: renders the images whose error is likely to be the smallest. progress: for a number of paths a pixel,
-    something that is told how far they are.
+    images: renders the images whose error is likely to be the smallest. bar: shows how
+    far the paths are.
     """
     bounces = int(scene.render.set.get("vpl.bounces", 1))
     truth = _kept(folder, scene, size, bounces)
     if truth and truth.record.get("sweep") == sweep:
         return truth
     if truth is None:
-        truth = _traced(scene, size, FIRST_SPP, bounces, seed=0, progress=progress(FIRST_SPP))
+        truth = _traced(scene, size, FIRST_SPP, bounces, seed=0, bar=bar)
         _save(folder, truth)
     best = images()
     while True:
@@ -106,15 +106,16 @@ def made(
         if (truth.noise or 0.0) * MARGIN <= SHARE * smallest or 2 * spp > MOST_SPP:
             break
         # As many paths again; all seeds before were smaller.
-        truth = _mean(truth, _traced(scene, size, spp, bounces, seed=spp, progress=progress(spp)))
+        truth = _mean(truth, _traced(scene, size, spp, bounces, seed=spp, bar=bar))
         _save(folder, truth)
     truth = Truth(truth.radiance, {**truth.record, "sweep": dict(sweep)})
     _save(folder, truth)
     return truth
 
 
-def _traced(scene: Scene, size: tuple[int, int], spp: int, bounces: int, *, seed: int, progress: Progress) -> Truth:
-    found = reference(scene, size, spp=spp, bounces=bounces, seed=seed, progress=progress)
+def _traced(scene: Scene, size: tuple[int, int], spp: int, bounces: int, *, seed: int, bar: ProgressBar) -> Truth:
+    bar.label(f"reference, {spp} paths")
+    found = reference(scene, size, spp=spp, bounces=bounces, seed=seed, progress=bar.show)
     return Truth(found.radiance, found.meta)
 
 

@@ -11,13 +11,13 @@ from typing import Any
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import GraphError, SettingError
+from deferred_ir.base.progress import progress_bar
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import IMAGES, Renderer
 from deferred_ir.engine.settings import chosen_settings
 from deferred_ir.gl.context import Gpu
 from deferred_ir.graph.file import graph_hash, load_graph
 from deferred_ir.graph.graph import Plan
-from deferred_ir.profiling.measure import bars
 from deferred_ir.profiling.peers import ladder
 from deferred_ir.profiling.peers.points import Peers
 from deferred_ir.profiling.sweep import edge_mask, points
@@ -115,17 +115,18 @@ def run(sweep: Sweep, folder: Path, reference: Path | None) -> tuple[list[Point]
             "graphs": [sweep.key(graph, max(sweep.vpls), 0).graph_hash for graph in sweep.graphs],
             "device": device,
         }
-        with bars() as bar:
+        with progress_bar() as bar:
             truth = sweep_reference.made(
                 folder,
                 sweep.moment,
                 sweep.size,
                 deciding,
                 images=lambda: _probes(sweep),
-                progress=lambda spp: bar(f"reference, {spp} paths"),
+                bar=bar,
             )
-    with bars() as bar:
-        mask = edge_mask.made(folder, sweep.moment, sweep.size, progress=lambda: bar("edges"))
+    with progress_bar() as bar:
+        bar.label("edges")
+        mask = edge_mask.made(folder, sweep.moment, sweep.size, bar.show)
     done, ahead = dict[str, Point](), list[tuple[str, int, int]]()
     truth_hash = truth.hash
     for share in sweep.shares():
@@ -150,21 +151,18 @@ def _measured(
     sweep: Sweep, folder: Path, truth: Truth, mask: Mask, ahead: Sequence[tuple[str, int, int]]
 ) -> Iterator[Point]:
     """Measure and keep the points `ahead`, with a bar on a terminal."""
-    from tqdm import tqdm
-
     flip_parameters = FlipParameters.of(truth.radiance)
     total = sum(vpls + OVERHEAD for _, vpls, _ in ahead)
-    style = "{desc} {percentage:3.0f}%|{bar}| {elapsed}, {remaining} left"
-    with tqdm(total=total, bar_format=style, disable=not sys.stderr.isatty(), file=sys.stderr) as bar:
+    with progress_bar(total=total) as bar:
         for graph in dict.fromkeys(graph for graph, _, _ in ahead):
             with Renderer(sweep.size, graph, sweep.device, set=sweep.settings) as renderer:
                 for _, vpls, seed in (share for share in ahead if share[0] == graph):
-                    bar.set_description(f"{graph}, {vpls} VPLs, seed {seed}")
+                    bar.label(f"{graph}, {vpls} VPLs, seed {seed}")
                     key = sweep.key(graph, vpls, seed)
                     yield _measure(
                         sweep, folder, renderer, truth, mask, flip_parameters=flip_parameters, key=key, graph=graph
                     )
-                    bar.update(vpls + OVERHEAD)
+                    bar.advance(vpls + OVERHEAD)
 
 
 def _measure(

@@ -30,6 +30,7 @@ THIRD_PARTIES = {
     "glfw": ("gl", "viewer"),
     "imgui_bundle": ("gl", "viewer"),
     "argparse": ("cli",),
+    "tqdm": ("base", "cli"),
 }
 """Rooms that may import them. The rooms of profiling are commands of their own and measure peers and systems."""
 

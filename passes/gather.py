@@ -20,8 +20,9 @@ from deferred_ir.base.arrays import Ints
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import last_shining
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.graph import Description, Input, Output, Pass, Texture
 from deferred_ir.graph.params import param
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
 from deferred_ir.vpls.shares import share_starts
 

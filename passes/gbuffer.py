@@ -9,7 +9,8 @@ from collections.abc import Mapping
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.graph import Description, Output, Pass, Texture
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Description, Output, Texture
 
 
 class GBuffer(Pass):

@@ -16,8 +16,9 @@ from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_buffer import VplParams, output, packed
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.graph import Description, Facts, Output, Pass
 from deferred_ir.graph.params import param
+from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.ports import Description, Output
 from deferred_ir.vpls.cast import NONE
 from deferred_ir.vpls.keep import IncrementalVpls
 

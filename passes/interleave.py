@@ -12,8 +12,9 @@ from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import in_order, shining_first
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.graph import Buffer, Description, Facts, Input, Output, Pass
 from deferred_ir.graph.params import param
+from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.ports import Buffer, Description, Input, Output
 from deferred_ir.vpls.shares import dealt, share_starts
 
 

@@ -12,7 +12,8 @@ from typing import ClassVar
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import last_shining
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.graph import Description, Facts, Input, Output, Pass, Texture
+from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
 from deferred_ir.vpls.shares import share_starts, sub_buffers
 

@@ -16,7 +16,8 @@ from deferred_ir.frame.light_culling import last_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.screen_tiles import FEWEST, Tiles, draws
 from deferred_ir.gl.shaders import Program
-from deferred_ir.graph.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 from deferred_ir.shadows import shader_variants
 

@@ -13,8 +13,9 @@ from typing import ClassVar
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.graph import Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.graph.params import param
+from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.vpls.clamp_residual import VplLimits, residual
 
 

@@ -15,7 +15,8 @@ import numpy as np
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.graph import NO_PORTS, Buffer, Description, Facts, Input, Output, Pass, Texture
+from deferred_ir.graph.pass_base import NO_PORTS, Facts, Pass
+from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 from deferred_ir.shadows import mesh_choice, paraboloid
 from deferred_ir.shadows.atlas_cache import KeptMaps

@@ -14,8 +14,9 @@ import numpy as np
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
 from deferred_ir.graph.params import param
+from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.rays.direct import on_pixels
 from deferred_ir.vpls.ray_masks import BITS, cost_of_maps, cost_of_rays, masks
 from deferred_ir.vpls.shares import places, share_starts

@@ -13,7 +13,8 @@ import numpy as np
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import shining
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.graph import Buffer, Description, Facts, Input, Output, Pass, Texture
+from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 from deferred_ir.shadows import mesh_choice, paraboloid
 from deferred_ir.shadows.settings import MapParams

@@ -16,7 +16,8 @@ from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.base.parallel import in_order
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.graph import Description, Input, Output, Pass, Texture
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.vpls.cast import Vpls

@@ -11,8 +11,8 @@ from typing import Any, ClassVar, Literal, get_args
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import FullscreenPass
-from deferred_ir.graph.graph import Description, Input, Output, Texture
 from deferred_ir.graph.params import param
+from deferred_ir.graph.ports import Description, Input, Output, Texture
 
 Operator = Literal["neutral", "reinhard", "aces", "none"]
 

@@ -12,8 +12,9 @@ from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_buffer import VplParams, map_versions, output, packed
 from deferred_ir.frame.light_culling import dropped, shining
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.graph import Description, Facts, Output, Pass
 from deferred_ir.graph.params import param
+from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.ports import Description, Output
 from deferred_ir.sampling.patterns import Pattern, warn_unbalanced
 from deferred_ir.vpls.cast import NONE, Vpls, cast
 from deferred_ir.vpls.choose import effects, probes, resample

@@ -15,8 +15,9 @@ from pages import ROOT, between
 
 from deferred_ir.graph import file
 from deferred_ir.graph.compile import compile
-from deferred_ir.graph.graph import Facts, Step
+from deferred_ir.graph.graph import Step
 from deferred_ir.graph.params import specs
+from deferred_ir.graph.pass_base import Facts
 
 PAGE = ROOT / "docs" / "graph.md"
 BEGIN = "<!-- passes: written by tools/pass_tables.py -->"

@@ -275,7 +275,7 @@ def _graph(arguments: argparse.Namespace) -> int:
     from deferred_ir.engine.settings import chosen_settings, parse_settings
     from deferred_ir.graph import file
     from deferred_ir.graph.compile import compile
-    from deferred_ir.graph.graph import Facts
+    from deferred_ir.graph.pass_base import Facts
     from deferred_ir.report import plan_text
     from deferred_ir.scene.scene import RenderDefaults
 

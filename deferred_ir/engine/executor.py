@@ -18,7 +18,10 @@ from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.shaders import ShaderLibrary
 from deferred_ir.gl.textures import Framebuffer, GpuBuffer, GpuTexture
 from deferred_ir.gl.timers import Timers
-from deferred_ir.graph.graph import Buffer, Description, Pass, Plan, Step, Texture
+from deferred_ir.graph.aliasing import alias_textures
+from deferred_ir.graph.graph import Plan, Step
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Buffer, Description, Texture
 
 FRAME_BLOCK = 0
 
@@ -164,7 +167,7 @@ class Executor:
         shares: transient outputs have textures in common.
         """
         self._plan = None  # if an allocation fails, the next frame starts over
-        self.tenants = plan.tenants() if shares else {}
+        self.tenants = alias_textures(plan) if shares else {}
         keys = {
             (step.name, port, output.description, _size(output.description, size), type(step.work))
             for step in plan.steps

@@ -24,7 +24,8 @@ from deferred_ir.gl.devices import Loader
 from deferred_ir.gl.timers import Timers
 from deferred_ir.graph import file
 from deferred_ir.graph.compile import compile
-from deferred_ir.graph.graph import Graph, Pass, Plan
+from deferred_ir.graph.graph import Graph, Plan
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.output.image import Image
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene

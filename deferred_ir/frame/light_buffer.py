@@ -11,8 +11,9 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.versions import new_versions
 from deferred_ir.gl.textures import GpuBuffer
-from deferred_ir.graph.graph import Buffer, Facts, Output
 from deferred_ir.graph.params import param
+from deferred_ir.graph.pass_base import Facts
+from deferred_ir.graph.ports import Buffer, Output
 from deferred_ir.scene.lights.spot import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
 from deferred_ir.scene.scene import Scene
 from deferred_ir.vpls.cast import Vpls

@@ -10,8 +10,9 @@ from deferred_ir.base.errors import DeviceError, ShaderError
 from deferred_ir.frame.frame import Frame
 from deferred_ir.gl.shaders import Program, ShaderLibrary
 from deferred_ir.gl.textures import Framebuffer, GpuBuffer, GpuTexture
-from deferred_ir.graph.graph import Pass, Step
+from deferred_ir.graph.graph import Step
 from deferred_ir.graph.params import specs
+from deferred_ir.graph.pass_base import Pass
 
 NO_DEFINES: Mapping[str, int | float] = {}
 Resource = GpuTexture | GpuBuffer | list[GpuTexture]

@@ -14,7 +14,7 @@ from deferred_ir.frame.cluster_buffers import ClusterBuffers
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.shaders import Program
 from deferred_ir.gl.textures import GpuTexture
-from deferred_ir.graph.graph import Texture
+from deferred_ir.graph.ports import Texture
 from deferred_ir.meshes.clusters import Clusters
 from deferred_ir.meshes.posed import MapMesh, PosedMesh
 from deferred_ir.scene.geometry import Geometry

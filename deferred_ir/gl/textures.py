@@ -15,7 +15,7 @@ from deferred_ir.base.errors import DeviceError
 from deferred_ir.base.versions import new_version
 from deferred_ir.gl import raw
 from deferred_ir.gl.context import Gpu
-from deferred_ir.graph.graph import Buffer, Texture
+from deferred_ir.graph.ports import Buffer, Texture
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,9 @@ from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 
 from deferred_ir.base.errors import GraphError, did_you_mean
-from deferred_ir.graph.graph import FRAME_PARTS, Description, Facts, Graph, Plan, Step
+from deferred_ir.graph.graph import Graph, Plan, Step
+from deferred_ir.graph.pass_base import FRAME_PARTS, Facts
+from deferred_ir.graph.ports import Description
 
 ANY_SCENE = Facts()
 """Of which nothing is known, so that nothing is left out."""

@@ -20,7 +20,8 @@ from typing import Any
 from deferred_ir.base.errors import GraphError, did_you_mean, shown
 from deferred_ir.base.toml_tables import DEEPEST, too_deep
 from deferred_ir.graph import former_names, params
-from deferred_ir.graph.graph import Graph, Node, Pass
+from deferred_ir.graph.graph import Graph, Node
+from deferred_ir.graph.pass_base import Pass
 
 PASSES = "deferred_ir.passes"
 GRAPHS = "deferred_ir.passes.graphs"

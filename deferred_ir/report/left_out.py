@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from deferred_ir.base.errors import DeviceError, GraphError
 from deferred_ir.engine.record import Record
-from deferred_ir.graph.graph import Plan, Texture
+from deferred_ir.graph.graph import Plan
+from deferred_ir.graph.ports import Texture
 from deferred_ir.scene.scene import Scene
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Vec3
 from deferred_ir.base.errors import SceneError, SettingError
-from deferred_ir.graph.graph import Facts
+from deferred_ir.graph.pass_base import Facts
 from deferred_ir.scene.camera import Camera, view_fault
 from deferred_ir.scene.geometry import Geometry, Model
 from deferred_ir.scene.lights.spot import Spotlight

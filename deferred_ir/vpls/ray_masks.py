@@ -14,7 +14,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.parallel import in_order
-from deferred_ir.graph.graph import Facts
+from deferred_ir.graph.pass_base import Facts
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Tracer
 

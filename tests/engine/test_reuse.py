@@ -14,7 +14,7 @@ from small_scenes import build, plane, room
 from deferred_ir.cli import main
 from deferred_ir.frame.frame import Frame
 from deferred_ir.gl.textures import GpuBuffer, GpuTexture
-from deferred_ir.graph.graph import FRAME_PARTS
+from deferred_ir.graph.pass_base import FRAME_PARTS
 
 SIZE = (32, 24)
 ROOM = room()

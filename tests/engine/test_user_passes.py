@@ -14,8 +14,9 @@ from small_scenes import room
 from deferred_ir.base.errors import GraphError, ShaderError
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.frame.pass_io import FullscreenPass
-from deferred_ir.graph.graph import Buffer, Facts, Input, Output, Pass, Texture
 from deferred_ir.graph.params import param
+from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.ports import Buffer, Input, Output, Texture
 
 SIZE = (24, 16)
 GRAPH = """

@@ -10,7 +10,7 @@ from deferred_ir.base.errors import DeviceError
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.debug import SWITCH
 from deferred_ir.gl.textures import GpuTexture
-from deferred_ir.graph.graph import Texture
+from deferred_ir.graph.ports import Texture
 
 NOWHERE = 0x1234
 

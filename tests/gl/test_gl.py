@@ -11,7 +11,7 @@ from deferred_ir.base.errors import DeviceError
 from deferred_ir.gl.raw import GL
 from deferred_ir.gl.textures import FORMATS, Framebuffer, GpuBuffer, GpuTexture
 from deferred_ir.gl.timers import Timers
-from deferred_ir.graph.graph import Buffer, Texture
+from deferred_ir.graph.ports import Buffer, Texture
 
 RECORD = np.dtype([("a", "f4", 4), ("b", "f4", 4)])
 

@@ -14,7 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from deferred_ir.graph.compile import compile
-from deferred_ir.graph.graph import Facts, Graph, Input, Output, Pass, Texture
+from deferred_ir.graph.graph import Graph
+from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.ports import Input, Output, Texture
 
 
 def test_a_pass_that_no_output_needs_is_left_out_with_the_reason():

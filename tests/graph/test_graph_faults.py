@@ -10,7 +10,9 @@ from fake_passes import Fake, graph, reads, source
 
 from deferred_ir.base.errors import GraphError
 from deferred_ir.graph.compile import compile
-from deferred_ir.graph.graph import Buffer, Facts, Graph, Output
+from deferred_ir.graph.graph import Graph
+from deferred_ir.graph.pass_base import Facts
+from deferred_ir.graph.ports import Buffer, Output
 
 
 def faults(broken: Graph, outputs: Sequence[str] = ("image",), facts: Facts | None = None) -> str:

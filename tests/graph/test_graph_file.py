@@ -17,8 +17,10 @@ from deferred_ir.base.errors import GraphError
 from deferred_ir.graph import file, former_names
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import graph_hash, graph_names, load_graph
-from deferred_ir.graph.graph import Facts, Graph, Input, Output, Pass, Texture
+from deferred_ir.graph.graph import Graph
 from deferred_ir.graph.params import param, specs
+from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.ports import Input, Output, Texture
 
 SMALL = """
 [outputs]

@@ -11,7 +11,7 @@ from small_scenes import crooked_room, room, smooth_scene
 
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import load_graph
-from deferred_ir.graph.graph import Facts
+from deferred_ir.graph.pass_base import Facts
 from deferred_ir.truth.path_tracer import PathTracer
 from deferred_ir.vpls import sum
 from deferred_ir.vpls.cast import Vpls, cast

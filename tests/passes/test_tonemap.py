@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from small_scenes import build, plane
 
-from deferred_ir.graph.graph import Output, Pass, Texture
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Output, Texture
 
 SIZE = (16, 12)
 GRAPH = '[outputs]\nradiance = "source.out"\ndisplay = "tonemap.color"\n[passes.source]\n[passes.tonemap]\n'

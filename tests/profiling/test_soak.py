@@ -14,7 +14,7 @@ from small_scenes import room
 
 from deferred_ir.base.errors import DeviceError
 from deferred_ir.gl.textures import GpuTexture
-from deferred_ir.graph.graph import Texture
+from deferred_ir.graph.ports import Texture
 from deferred_ir.output.image import Image
 from deferred_ir.profiling.checks import soak
 from deferred_ir.profiling.checks.soak import ROUND, STRETCH, Count, Soak

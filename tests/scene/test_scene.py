@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from small_scenes import GREY, Mesh, box, build, plane, room, textured
 
 from deferred_ir.base.errors import SettingError
-from deferred_ir.graph.graph import Facts
+from deferred_ir.graph.pass_base import Facts
 from deferred_ir.loading.load import load
 from deferred_ir.scene.motion import LissajousMotion, ModelMotion
 from deferred_ir.scene.scene import Geometry

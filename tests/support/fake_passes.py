@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from deferred_ir.graph.graph import Graph, Input, Node, Output, Pass, Plan, Texture
+from deferred_ir.graph.graph import Graph, Node, Plan
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Input, Output, Texture
 
 
 class Fake(Pass):

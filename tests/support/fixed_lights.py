@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.engine.renderer import Renderer
-from deferred_ir.graph.graph import Buffer, Output, Pass
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Buffer, Output
 from deferred_ir.scene.lights.spot import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, light_records
 from deferred_ir.scene.scene import Scene
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from deferred_ir.gl.textures import GpuTexture
-from deferred_ir.graph.graph import Plan, Texture
+from deferred_ir.graph.graph import Plan
+from deferred_ir.graph.ports import Texture
 from deferred_ir.viewer.canvas import Area, Canvas
 from deferred_ir.viewer.reference_job import Truth
 from deferred_ir.viewer.session import Session

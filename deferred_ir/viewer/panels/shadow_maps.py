@@ -7,7 +7,8 @@ from typing import Any
 
 from deferred_ir.frame.light_culling import shining
 from deferred_ir.gl.textures import GpuTexture
-from deferred_ir.graph.graph import Step, Texture
+from deferred_ir.graph.graph import Step
+from deferred_ir.graph.ports import Texture
 from deferred_ir.viewer.canvas import Area, Canvas
 from deferred_ir.viewer.controls import Controls
 from deferred_ir.viewer.panels.light_frames import records

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from test_scene_file import toml
+from toml_text import toml
 
 from deferred_ir.base.errors import GraphError
 from deferred_ir.graph import file, former_names

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from toml_text import toml
 
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading import scene_file
@@ -298,22 +298,6 @@ VALUES = st.recursive(
 )
 TRIPLES = st.lists(st.integers(-2, 2) | st.floats(), min_size=3, max_size=3)
 TABLES = st.dictionaries(KEYS, VALUES | TRIPLES, max_size=6)
-
-
-def toml(value: object) -> str:
-    """A value as inline TOML: JSON, but for floats, tables and dates (for None)."""
-    match value:
-        case None:
-            text = "1979-05-27"
-        case list():
-            text = f"[{', '.join(toml(item) for item in value)}]"
-        case dict():
-            text = f"{{{', '.join(f'{toml(key)} = {toml(item)}' for key, item in value.items())}}}"
-        case float():
-            text = repr(value)
-        case _:
-            text = json.dumps(value).replace("\x7f", "\\u007f")
-    return text
 
 
 @settings(deadline=None, max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])

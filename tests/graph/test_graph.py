@@ -125,7 +125,7 @@ def test_writers_come_before_readers_in_the_same_order_every_time():
 
 def test_the_order_is_the_same_in_every_process():
     script = (
-        "import sys; sys.path.insert(0, 'tests')\n"
+        "import sys; sys.path[:0] = ['tests/graph', 'tests/support']\n"
         "from test_graph import diamond, names\n"
         "from deferred_ir.graph.compile import compile\n"
         "print(*names(compile(diamond(), ['image'])))\n"

@@ -8,8 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from small_scenes import build, crooked_room, plane, quad, room
-from test_moving_models import two
+from distance import same_pixels
+from moving_scenes import room_with_moving_models
+from small_scenes import build, crooked_room, gable, plane, room
 
 from deferred_ir.cli import main
 from deferred_ir.frame.pass_io import FullscreenPass
@@ -18,21 +19,9 @@ from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.aliasing import alias_textures
 from deferred_ir.graph.ports import Input, Output, Texture
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
 
 SIZE = (48, 48)
 DARK = (0.0, 0.0, 0.0)
-
-
-def gable():
-    """A roof below the light: the camera looks at one side and at what that faces; the other side faces away."""
-    return build(
-        quad((-1, -1, 1), (0, 0, 1), (0, 0, -1), (0.7, 0.2, 0.1)),
-        quad((0.3, -0.3, 1), (2.5, -2.5, 1), (2.5, -2.5, -1)),
-        quad((4, -4, 4), (4, 2, 4), (4, 2, -4), (0.2, 0.3, 0.8)),
-        camera=Camera((1, 1, 0.2), (2.5, -1.5, 0), fov=60.0),
-        spotlight=Spotlight((0.1, 1.6, 0.1), (0.1, -1.0, 0.0), 100.0, (3.0, 2.5, 2.0)),
-    )
 
 
 def both(renderer, scene, graph, *, vpls=None, size=SIZE, **settings):
@@ -43,10 +32,6 @@ def both(renderer, scene, graph, *, vpls=None, size=SIZE, **settings):
         image = one.render(scene, vpls=vpls)
         result.append((image, dict(one.executor.counters), one.plan(scene, vpls)))
     return result
-
-
-def same(one, other):
-    return np.array_equal(one.radiance, other.radiance) and np.array_equal(one.display, other.display)
 
 
 GRAPHS = [
@@ -64,7 +49,7 @@ GRAPHS = [
 def test_lights_that_light_nothing_in_view_get_no_map(renderer, graph, settings):
     (image, counters, _), (full, kept, _) = both(renderer, gable(), graph, vpls=64, **settings)
     assert image.radiance.any()
-    assert same(image, full)
+    assert same_pixels(image, full)
     assert 5 < counters["lights_dropped"] < 40
     assert "lights_dropped" not in kept
     assert counters["vpls_alive"] == kept["vpls_alive"]
@@ -78,7 +63,7 @@ def test_many_lights_are_added_up_in_the_same_blocks_without_those_that_are_drop
         renderer, gable(), graph, vpls=500, **{"shadow_maps.vpl_size": 16, "vpl.pattern": "random"}
     )
     assert counters["lights_dropped"] > 50
-    assert same(image, full)
+    assert same_pixels(image, full)
 
 
 def test_a_spotlight_that_shines_where_nobody_looks_gets_no_map(renderer):
@@ -89,7 +74,7 @@ def test_a_spotlight_that_shines_where_nobody_looks_gets_no_map(renderer):
     (image, counters, _), (full, kept, _) = both(renderer, away, "deferred", vpls=16)
     assert counters["maps_drawn"] == 0
     assert kept["maps_drawn"] == 1 + kept["vpls_alive"] > 1
-    assert same(image, full)
+    assert same_pixels(image, full)
 
 
 def test_the_plan_of_a_frame_says_which_lights_have_no_map(renderer):
@@ -110,7 +95,7 @@ def test_without_vpls_nothing_is_cast_shared_or_filtered(renderer, graph):
     plan = one.plan(room(), 0)
     assert not {"light_shares", "gather", "near_field", "thin_rays"} & {step.name for step in plan.steps}
     full = renderer(SIZE, graph, keep_all=True)
-    assert same(image, full.render(room(), vpls=0))
+    assert same_pixels(image, full.render(room(), vpls=0))
     if graph != "forward":
         assert one.executor.counters["maps_drawn"] in (0, 1)
     kept = full.plan(room(), 0)
@@ -121,7 +106,7 @@ def test_without_vpls_nothing_is_cast_shared_or_filtered(renderer, graph):
 def test_without_light_there_are_no_maps_and_no_rays(renderer, graph):
     scene = replace(room(), spotlight=replace(room().spotlight, emission=DARK))
     (image, counters, plan), (full, _, kept) = both(renderer, scene, graph, vpls=8)
-    assert same(image, full)
+    assert same_pixels(image, full)
     assert not image.radiance.any()
     assert "shadow_maps" in plan.left_out
     assert plan.left_out.keys() > kept.left_out.keys()
@@ -179,7 +164,7 @@ def test_the_atlas_has_room_for_the_lights_that_live(renderer, monkeypatch):
     assert 16 < tiles < 200
     assert atlas(one).layers == 1 + -(-tiles // 16) < 17
     full = renderer(SIZE, set=settings, keep_all=True)
-    assert same(image, full.render(half, vpls=256))
+    assert same_pixels(image, full.render(half, vpls=256))
     assert atlas(full).layers == 17
     made.clear()
     for seed in range(1, 7):
@@ -194,8 +179,8 @@ def test_transient_targets_share_textures_and_the_pixels_are_the_same(renderer):
         settings = {"shadow_rays.visibility": "rays"} if graph == "accurate" else {}
         one, full = (renderer(SIZE, graph, set=settings, keep_all=keep_all) for keep_all in (False, True))
         images = [r.render(room(), vpls=16, seed=seed) for r in (one, full) for seed in (0, 1)]
-        assert same(images[0], images[2])
-        assert same(images[1], images[3])
+        assert same_pixels(images[0], images[2])
+        assert same_pixels(images[1], images[3])
         plan = one.plan(room(), 16)
         assert len(alias_textures(plan)) == 1
         spared = full.executor.memory()["textures"] - one.executor.memory()["textures"]
@@ -234,20 +219,21 @@ def test_tiles_of_the_screen_skip_lights_that_they_lie_behind(renderer, graph, s
     (image, counters, _), (full, kept, _) = both(renderer, scene, graph, vpls=vpls, size=size, **settings)
     assert counters["lights_skipped"] > 5
     assert "lights_skipped" not in kept
-    assert same(image, full)
+    assert same_pixels(image, full)
 
 
 def test_tiles_that_show_nothing_are_not_drawn(renderer):
     scene = build(plane(), camera=Camera((0.0, 3.0, 0.1), (2.0, 0.0, 0.0), fov=70.0))
     (image, _, _), (full, _, _) = both(renderer, scene, "deferred", vpls=16, size=(192, 192))
-    assert same(image, full)
+    assert same_pixels(image, full)
     camera = Tiles.of(np.where(np.arange(192) > 100, 0.5, 0.0)[None].repeat(192, axis=0), scene.camera, 0.1)
     assert sorted(set(camera.rectangles[:, 0].tolist())) == [64, 128]
 
 
 @pytest.mark.parametrize("graph", ["deferred", "interleaved"])
 def test_nothing_is_missing_when_models_move(renderer, graph):
-    scene, ways = two(), [renderer((96, 70), graph, keep_all=keep_all) for keep_all in (False, True)]
+    scene = room_with_moving_models()
+    ways = [renderer((96, 70), graph, keep_all=keep_all) for keep_all in (False, True)]
     for time in (0.0, 0.7, 0.2):
         images = [one.render(scene, vpls=24, time=time) for one in ways]
-        assert same(*images)
+        assert same_pixels(*images)

@@ -10,9 +10,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
-from small_scenes import box, build, plane, room, sphere, textured
-from test_far_from_origin import away
+from moving_scenes import (
+    AROUND,
+    BALL,
+    BLOCK,
+    TURN,
+    UP,
+    VECTORS,
+    VIEW,
+    WALLS,
+    bake,
+    pose_matrix,
+    room_with_moving_models,
+)
+from small_scenes import box, build, move_away, plane, room, sphere, textured
 
 from deferred_ir import load
 from deferred_ir.engine.renderer import Renderer
@@ -24,43 +35,11 @@ from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.reference import reference
 
 SIZE = (48, 32)
-WALLS = box((-1, -1, -1), (1, 1, 1))
-BLOCK = box((-0.2, -0.3, -0.25), (0.3, 0.3, 0.15), (0.7, 0.2, 0.1))
-BALL = sphere(0.25, 2, (0.1, 0.6, 0.3))
-TURN = (0.0, float(np.sin(0.5)), 0.0, float(np.cos(0.5)))
-AROUND = ModelMotion((0.0, 1.0), ((-0.4, -0.7, -0.3), (0.5, -0.5, 0.1)), ((0.0, 0.0, 0.0, 1.0), TURN))
-UP = ModelMotion((0.0, 0.5, 2.0), ((0.4, -0.7, 0.2), (0.4, 0.0, 0.0), (-0.5, 0.2, -0.4)), ((0.0, 0.0, 0.0, 1.0),) * 3)
-VIEW = {"camera": room().camera, "spotlight": room().spotlight}
-
-
-def two() -> Scene:
-    """A room with a block and a smooth ball that move."""
-    return build(WALLS, BLOCK, BALL, motions=(None, AROUND, UP), **VIEW)
-
-
-def one_block() -> Scene:
-    return build(WALLS, BLOCK, motions=(None, AROUND), **VIEW)
-
-
-def baked(scene: Scene, time: float) -> Scene:
-    """The same at `time`, made so from the start, of the same extent."""
-    there = scene.at(time)
-    geometry = replace(scene.geometry, positions=there.geometry.positions, normals=there.geometry.normals, moving=())
-    geometry.__dict__.update(extent=scene.geometry.extent)
-    return replace(scene, geometry=geometry)
-
-
-def pose(vector: Any, shift: Any) -> np.ndarray:
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = Rotation.from_rotvec(vector).as_matrix(), shift
-    return made
-
-
 # Geometry
 
 
 def test_only_what_moves_is_new():
-    scene = two()
+    scene = room_with_moving_models()
     rest, there = scene.geometry, scene.at(0.3).geometry
     block = slice(8, 16)
     assert (there.positions[:8] == rest.positions[:8]).all()
@@ -69,7 +48,7 @@ def test_only_what_moves_is_new():
     np.testing.assert_allclose(there.normals[16:], rest.normals[16:], atol=1e-7)  # the ball does not turn
     for name in ("faces", "face_materials", "uvs", "colors"):
         assert getattr(there, name) is getattr(rest, name)
-    np.testing.assert_array_equal(there.face_normals, baked(scene, 0.3).geometry.face_normals)
+    np.testing.assert_array_equal(there.face_normals, bake(scene, 0.3).geometry.face_normals)
     assert there.rest is rest
 
 
@@ -85,20 +64,20 @@ def test_distances_that_depend_on_the_scenes_size_stay():
 
 
 def test_the_same_pose_is_the_same_object():
-    scene = two()
+    scene = room_with_moving_models()
     assert scene.at(0.5).geometry is scene.at(0.5).geometry
     assert scene.at(7.0).geometry is scene.at(8.0).geometry  # at rest
     assert scene.at(0.5).geometry is not scene.at(0.6).geometry
     assert scene.at(0.5).at(1.0).geometry is scene.at(0.5).geometry  # a moment stays
     still = room()
     assert still.at(3.0).geometry is still.geometry
-    far = away(scene)
+    far = move_away(scene)
     assert far.at(7.0).centred.geometry is far.at(8.0).centred.geometry
 
 
 def test_a_pose_is_not_that_of_another_thread(monkeypatch):
     """The viewer poses the scene that plays while a reference of it is traced."""
-    geometry, equal = two().geometry, np.array_equal
+    geometry, equal = room_with_moving_models().geometry, np.array_equal
     here, there = (np.stack([AROUND.matrix(time), UP.matrix(time)]) for time in (0.2, 0.9))
     expected = geometry.posed(here)
 
@@ -118,24 +97,20 @@ def away_moving(scene: Scene, by: tuple[float, float, float]) -> Scene:
         for model in scene.models
     )
     moving = tuple(model for model in models if model.motion)
-    moved = away(scene, by)
+    moved = move_away(scene, by)
     return replace(moved, models=models, geometry=replace(moved.geometry, moving=moving))
 
 
 # Rays
 
 
-numbers = st.floats(-1, 1)
-vectors = st.tuples(numbers, numbers, numbers)
-
-
 @settings(max_examples=40)
-@given(st.lists(st.tuples(vectors, vectors), min_size=2, max_size=2), st.integers(0, 2**31), st.booleans())
+@given(st.lists(st.tuples(VECTORS, VECTORS), min_size=2, max_size=2), st.integers(0, 2**31), st.booleans())
 def test_rays_meet_what_they_would_in_the_moved_scene(poses, seed, walls):
     meshes = (WALLS, BLOCK, BALL) if walls else (BLOCK, BALL)
     scene = build(*meshes, motions=(None, AROUND, UP)[3 - len(meshes) :])
     tracer = Tracer(scene.at(0.0))
-    geometry = scene.geometry.posed(np.stack([pose(3 * np.array(turn), shift) for turn, shift in poses]))
+    geometry = scene.geometry.posed(np.stack([pose_matrix(3 * np.array(turn), shift) for turn, shift in poses]))
     moved = replace(scene, geometry=geometry)
     tracer.follow(moved)
     fresh = Tracer(replace(scene, geometry=replace(scene.geometry, positions=geometry.positions, moving=())))
@@ -179,12 +154,12 @@ GRAPHS = ["deferred", "forward", "interleaved", "accurate"]
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_a_moved_scene_looks_as_if_made_so(renderer: Callable[..., Renderer], graph: str):
     one, other = renderer(SIZE, graph), renderer(SIZE, graph)
-    scene = two()
+    scene = room_with_moving_models()
     for time in (0.0, 0.7, 0.2):
         direct = one.render(scene, vpls=0, time=time).radiance
-        np.testing.assert_array_equal(direct, other.render(baked(scene, time), vpls=0).radiance)
+        np.testing.assert_array_equal(direct, other.render(bake(scene, time), vpls=0).radiance)
         found = one.render(scene, vpls=8, time=time).radiance
-        assert_same(found, other.render(baked(scene, time), vpls=8).radiance)
+        assert_same(found, other.render(bake(scene, time), vpls=8).radiance)
     assert not np.array_equal(found, one.render(scene, vpls=8, time=0.7).radiance)
 
 
@@ -205,32 +180,32 @@ def test_maps_show_what_moves_where_it_is(renderer, graph, options, tolerance):
     scene = build(WALLS, BLOCK, sphere(0.3, 4), motions=(None, AROUND, UP), **VIEW)
     for time in (0.0, 0.9):
         found = one.render(scene, vpls=16, time=time).radiance
-        expected = other.render(baked(scene, time), vpls=16).radiance
+        expected = other.render(bake(scene, time), vpls=16).radiance
         off = np.abs(found - expected).max(axis=-1) > 1e-3 * expected.max()
         assert off.mean() <= tolerance
-    still = other.render(baked(scene, 0.0), vpls=16).radiance
+    still = other.render(bake(scene, 0.0), vpls=16).radiance
     assert (np.abs(still - expected).max(axis=-1) > 0.01 * expected.max()).mean() > 0.1
 
 
 def test_a_reference_is_of_the_moved_scene():
-    scene = two()
-    now, made = reference(scene.at(0.7), SIZE, spp=4), reference(baked(scene, 0.7), SIZE, spp=4)
+    scene = room_with_moving_models()
+    now, made = reference(scene.at(0.7), SIZE, spp=4), reference(bake(scene, 0.7), SIZE, spp=4)
     np.testing.assert_allclose(now.radiance, made.radiance, atol=1e-4 * made.radiance.max())
 
 
 def test_a_textured_model_carries_its_texture(renderer):
     pixels = np.random.default_rng(0).integers(0, 255, (8, 8, 3))
-    scene = two()
+    scene = room_with_moving_models()
     uvs = np.random.default_rng(1).random((len(scene.geometry.positions), 2))
     scene = textured(scene, pixels, uvs)
     one, other = renderer(SIZE), renderer(SIZE)
     for time in (0.2, 0.6):
         found = one.render(scene, vpls=4, time=time).radiance
-        assert_same(found, other.render(baked(scene, time), vpls=4).radiance)
+        assert_same(found, other.render(bake(scene, time), vpls=4).radiance)
 
 
 def test_far_from_the_origin(renderer):
-    scene, far = two(), away_moving(two(), (1e5, -2e5, 3e5))
+    scene, far = room_with_moving_models(), away_moving(room_with_moving_models(), (1e5, -2e5, 3e5))
     one, other = renderer(SIZE), renderer(SIZE)
     for time in (0.0, 0.8):
         near, away_ = one.render(scene, vpls=8, time=time).radiance, other.render(far, vpls=8, time=time).radiance
@@ -268,7 +243,7 @@ class Counted:
 
 
 def test_only_what_moved_is_written(renderer):
-    one, scene = renderer(SIZE), two()
+    one, scene = renderer(SIZE), room_with_moving_models()
     one.render(scene, vpls=4)
     buffers = one._buffers
     counted = {name: Counted(buffer) for name, (buffer, _) in buffers._attributes.items()}
@@ -302,7 +277,7 @@ def test_a_model_that_leaves_where_it_was(renderer):
     one.render(scene, vpls=8)
     found = one.render(scene, vpls=8, time=1.0).radiance
     assert found.max() > 0.01
-    assert_same(found, other.render(baked(scene, 1.0), vpls=8).radiance)
+    assert_same(found, other.render(bake(scene, 1.0), vpls=8).radiance)
 
 
 def test_beside_a_ground_that_is_cut_up(renderer):
@@ -313,14 +288,14 @@ def test_beside_a_ground_that_is_cut_up(renderer):
     one, other = renderer(SIZE), renderer(SIZE)
     for time in (0.2, 0.6):
         found = one.render(scene, vpls=8, time=time).radiance
-        expected = other.render(baked(scene, time), vpls=8).radiance
+        expected = other.render(bake(scene, time), vpls=8).radiance
         assert np.median(np.abs(found - expected)) < 1e-5 * expected.max()
         assert (np.abs(found - expected).max(axis=-1) > 1e-2 * expected.max()).mean() < 0.01
 
 
 @pytest.mark.parametrize("graph", ["deferred", "interleaved"])
 def test_what_is_kept_between_frames_sees_that_models_move(renderer, graph):
-    one, other, scene = renderer(SIZE, graph, reuse=True), renderer(SIZE, graph), two()
+    one, other, scene = renderer(SIZE, graph, reuse=True), renderer(SIZE, graph), room_with_moving_models()
     for time in (0.0, 0.3, 0.3, 0.6, 5.0, 6.0):
         found = one.render(scene, vpls=8, time=time).radiance
         np.testing.assert_array_equal(found, other.render(scene, vpls=8, time=time).radiance)
@@ -329,7 +304,7 @@ def test_what_is_kept_between_frames_sees_that_models_move(renderer, graph):
 
 
 def test_a_move_that_is_broken_off_is_done_again(renderer, monkeypatch):
-    one, other, scene = renderer(SIZE, reuse=True), renderer(SIZE), two()
+    one, other, scene = renderer(SIZE, reuse=True), renderer(SIZE), room_with_moving_models()
     one.render(scene, vpls=8)
     with monkeypatch.context() as broken:
         broken.setattr(PosedMesh, "move", lambda *_: 1 / 0)

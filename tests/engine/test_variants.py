@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from distance import same_pixels
 from small_scenes import build, plane, room, smooth_scene, textured
-from test_leaving_out import same
 
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.scene import Scene
@@ -57,7 +57,7 @@ def pictures(renderer, graph, **settings):
 def test_no_pixel_depends_on_the_variant(renderer, graph):
     for name, (image, general) in pictures(renderer, graph).items():
         assert image.radiance.max() > 0.01, name
-        assert same(image, general), name
+        assert same_pixels(image, general), name
 
 
 @pytest.mark.parametrize("operator", ["neutral", "reinhard", "aces", "none"])
@@ -68,7 +68,7 @@ def test_nor_on_that_of_clamp_and_tone_curve(renderer, operator):
         renderer(SIZE, "deferred", set=settings, keep_all=keep_all).render(smooth_scene()) for keep_all in (False, True)
     )
     assert image.display.max() > 10
-    assert same(image, general)
+    assert same_pixels(image, general)
 
 
 def test_a_scene_compiles_only_what_no_scene_before_it_needed(renderer):

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from fake_passes import Fake, graph, names, reads, source
+from fake_passes import Fake, diamond, graph, names, reads, source
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -108,16 +108,6 @@ def test_what_only_left_out_passes_read_is_left_out_too():
     assert plan.left_out == {"vertices": "no requested output needs it", "maps": "the light is off"}
 
 
-def diamond() -> Graph:
-    return graph(
-        end=(Fake(reads("l", "r")), {"l": "left.out", "r": "right.out"}),
-        left=(Fake(reads("x")), {"x": "start.out"}),
-        right=(Fake(reads("x")), {"x": "start.out"}),
-        start=source(),
-        last=(Fake(reads("x")), {"x": "end.out"}),
-    )
-
-
 def test_writers_come_before_readers_in_the_same_order_every_time():
     orders = {tuple(names(compile(diamond(), ["image"]))) for _ in range(5)}
     assert orders == {("start", "left", "right", "end", "last")}
@@ -125,8 +115,8 @@ def test_writers_come_before_readers_in_the_same_order_every_time():
 
 def test_the_order_is_the_same_in_every_process():
     script = (
-        "import sys; sys.path[:0] = ['tests/graph', 'tests/support']\n"
-        "from test_graph import diamond, names\n"
+        "import sys; sys.path.insert(0, 'tests/support')\n"
+        "from fake_passes import diamond, names\n"
         "from deferred_ir.graph.compile import compile\n"
         "print(*names(compile(diamond(), ['image'])))\n"
         "assert 'moderngl' not in sys.modules and 'numpy' not in sys.modules\n"

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from toml_text import toml
+from toml_text import to_toml
 
 from deferred_ir.base.errors import GraphError
 from deferred_ir.graph import file, former_names
@@ -412,7 +412,7 @@ VALUES = st.recursive(
     st.dictionaries(st.sampled_from(["end.radius", "vpl.count", "end"]) | st.text(max_size=5), VALUES, max_size=2),
 )
 def test_any_file_gives_a_graph_or_one_line(tmp_path, table, chosen):
-    path = write(tmp_path, "\n".join(f"{key} = {toml(value)}" for key, value in table.items()))
+    path = write(tmp_path, "\n".join(f"{key} = {to_toml(value)}" for key, value in table.items()))
     try:
         graph = load_graph(path, chosen, OWN)
         compile(graph, list(graph.outputs))

@@ -3,15 +3,11 @@
 import ast
 import re
 import sys
-import tomllib
 from importlib import metadata
-from pathlib import Path
 
 import pytest
+from source_imports import MODULES, PROJECT, ROOT, imports
 
-ROOT = Path(__file__).resolve().parents[2]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-FOLDERS = PROJECT["tool"]["setuptools"]["package-dir"]
 ROOMS = (
     *("base", "sampling", "graph", "gl", "scene", "meshes", "rays", "output", "loading", "vpls", "frame", "shadows"),
     *("passes", "engine", "report", "truth", "viewer", "profiling", "cli"),
@@ -35,15 +31,6 @@ THIRD_PARTIES = {
 """Rooms that may import them. The rooms of profiling are commands of their own and measure peers and systems."""
 
 
-def modules():
-    """Every module's installed name, e.g. deferred_ir.passes.gbuffer, and its file."""
-    for package, folder in FOLDERS.items():
-        for file in sorted((ROOT / folder).rglob("*.py")):
-            inner = file.relative_to(ROOT / folder).with_suffix("").parts
-            yield ".".join([package, *(inner[:-1] if inner[-1] == "__init__" else inner)]), file
-
-
-MODULES = dict(modules())
 FILES = [name for name, file in MODULES.items() if file.name != "__init__.py"]
 
 
@@ -51,18 +38,6 @@ def room(module):
     """The room of a module, `frame` of deferred_ir.frame.pass_io; "" for what lies in none."""
     parts = module.split(".")
     return parts[1] if len(parts) > 1 and parts[1] in ROOMS else ""
-
-
-def imports(name):
-    """All modules that `name` imports, anywhere in it; `from x import y` gives x.y where that is a module, else x."""
-    for node in ast.walk(ast.parse(MODULES[name].read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert not node.level, f"{name}: relative imports hide the room; write deferred_ir...."
-            for alias in node.names:
-                inner = f"{node.module}.{alias.name}"
-                yield inner if inner in MODULES else node.module
 
 
 def third_party(name):

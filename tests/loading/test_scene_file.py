@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from toml_text import toml
+from toml_text import to_toml
 
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading import scene_file
@@ -308,7 +308,7 @@ TABLES = st.dictionaries(KEYS, VALUES | TRIPLES, max_size=6)
     )
 )
 def test_any_tables_give_a_scene_or_one_line(tmp_path: Path, data: dict[str, object]) -> None:
-    text = "\n".join(f"{key} = {toml(value)}" for key, value in data.items())
+    text = "\n".join(f"{key} = {to_toml(value)}" for key, value in data.items())
     try:
         read(tmp_path, text)
     except SceneError as error:

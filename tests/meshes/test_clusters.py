@@ -7,7 +7,7 @@ import pytest
 from fixed_lights import lit_by, spot_record, vpl_records
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_scenes import Mesh, build, crooked_room, room
+from small_scenes import Mesh, build, crooked_room, room, triangle_soup
 
 from deferred_ir.loading.load import load
 from deferred_ir.meshes.clusters import Clusters
@@ -17,16 +17,6 @@ from deferred_ir.shadows import mesh_choice
 
 SETTINGS = {"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}
 WHOLE = 10**9
-
-
-def soup(seed: int, count: int = 300, scale: float = 1.0, offset: float = 0.0) -> Mesh:
-    """Triangles from a ten-thousandth of the scene to ten times its size, slivers and degenerate ones among them."""
-    rng = np.random.default_rng(seed)
-    size = 10.0 ** rng.uniform(-4, 1, (count, 1, 1))
-    corners = rng.uniform(-1, 1, (count, 1, 3)) + size * rng.normal(size=(count, 3, 3))
-    corners[::17, 2] = corners[::17, 1]
-    corners[1::17, 2] = corners[1::17, 0] * 0.5 + corners[1::17, 1] * 0.5
-    return Mesh(corners.reshape(-1, 3) * scale + offset, np.arange(3 * count).reshape(-1, 3))
 
 
 def lights_among(mesh: Mesh, seed: int, count: int = 8, fov: float = 150.0) -> np.ndarray:
@@ -48,7 +38,7 @@ def lights_among(mesh: Mesh, seed: int, count: int = 8, fov: float = 150.0) -> n
 
 @pytest.mark.parametrize("count", [1, 7, 8, 9, 16, 17, 100, 300])
 def test_each_triangle_is_in_one_cluster(count):
-    mesh = soup(1, count)
+    mesh = triangle_soup(1, count)
     clusters = Clusters(mesh.positions, mesh.faces, most=8)
     assert sorted(clusters.order) == list(range(count))
     assert clusters.starts[0] == 0
@@ -67,7 +57,7 @@ def test_clusters_of_triangles_of_one_size_are_full_but_for_the_last(count):
 
 def test_a_cluster_holds_triangles_of_like_size():
     """So a large triangle does not count as bent, with all its neighbours, in maps in which they are flat."""
-    mesh = soup(2, 400)
+    mesh = triangle_soup(2, 400)
     corners = mesh.positions[mesh.faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     clusters = Clusters(mesh.positions, mesh.faces, most=8)
@@ -104,7 +94,7 @@ def clip_distances(light: np.ndarray, positions: np.ndarray, hemisphere: bool) -
     hemisphere=st.booleans(),
 )
 def test_what_is_left_out_lies_behind_one_plane_for_the_shader_too(seed, fov, scale, offset, hemisphere):
-    mesh = soup(seed, 64, scale, offset * scale)
+    mesh = triangle_soup(seed, 64, scale, offset * scale)
     clusters = Clusters(mesh.positions, mesh.faces, most=4)
     lights = lights_among(mesh, seed, fov=fov)
     visible = clusters.visible(lights, hemisphere=hemisphere)
@@ -129,7 +119,7 @@ def test_what_a_light_cannot_see_is_left_out(hemisphere):
 
 
 def test_no_lights_see_no_clusters():
-    mesh = soup(1)
+    mesh = triangle_soup(1)
     clusters = Clusters(mesh.positions, mesh.faces, most=8)
     assert clusters.visible(np.zeros(0, LIGHT)).shape == (0, len(clusters))
 
@@ -172,7 +162,7 @@ def test_any_scene_has_the_same_maps(atlases, layer_from_vertex):
         most=st.sampled_from([1, 8, 64]),
     )
     def same(seed, fov, scale, most):
-        mesh = soup(seed, scale=scale)
+        mesh = triangle_soup(seed, scale=scale)
         scene = build(mesh)
         draw.records[:1] = spot_record(scene)
         draw.records[1:] = lights_among(mesh, seed, fov=fov)
@@ -197,7 +187,7 @@ def test_the_atrium_has_the_same_maps(atlases):
 def test_lights_of_every_block_have_the_same_maps(atlases):
     count = LIGHTS_PER_BLOCK + 9
     draw = atlases(count, settings={"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 16})
-    mesh = soup(8, 64)
+    mesh = triangle_soup(8, 64)
     scene = build(mesh)
     draw.records[:1] = spot_record(scene)
     draw.records[1:] = lights_among(mesh, 8, count - 1)

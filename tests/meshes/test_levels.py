@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from equivalence import assert_equivalent, hit_pixels, render_both
 from fixed_lights import vpl_records
 from small_scenes import box, build, room, scaled, sphere
-from test_equivalence import assert_equal, both, hit
 
 from deferred_ir.base.errors import GraphError
 from deferred_ir.meshes import levels as detail
@@ -83,8 +83,8 @@ def test_units_do_not_matter(balls):
 @pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
 def test_forward_and_deferred_draw_the_same(renderer, balls, projection):
     chosen = {"shadow_maps.vpl_deviation": 4.0, "shadow_maps.projection": projection}
-    deferred, forward = both(renderer, balls, chosen)
-    assert_equal(deferred, forward, hit("balls", balls))
+    deferred, forward = render_both(renderer, balls, chosen)
+    assert_equivalent(deferred, forward, hit_pixels("balls", balls))
 
 
 def test_only_one_mesh_can_stand_in(renderer):

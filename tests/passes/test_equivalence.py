@@ -7,16 +7,13 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from distance import rel_mse, share_off
+from equivalence import SIZE, VPLS, assert_equivalent, hit_pixels, render_both
 from small_scenes import crooked_room
 
 from deferred_ir.gl import raw
 from deferred_ir.loading.load import builtin_scenes, load
-from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 
-SIZE = (128, 128)
-VPLS = 64
 NEGATIVE_ONE_TO_ONE = 0x935E
 ODD = """
 o box
@@ -72,41 +69,15 @@ def scene_named(name: str) -> Scene:
     return crooked_room() if name == "room" else load(name)
 
 
-@lru_cache
-def hit(name: str, scene: Scene) -> np.ndarray:
-    rays = scene.camera.rays(SIZE).reshape(-1, 3)
-    hits = Tracer(scene).closest(np.broadcast_to(scene.camera.position, rays.shape), rays)
-    return hits.hit.reshape(SIZE[1], SIZE[0])
-
-
-def both(make, scene, settings=None, *, prepare=None, forward=None, vpls=VPLS):
-    """Radiance by deferred and by forward; `prepare` is called with each Renderer before it draws."""
-    images = []
-    for graph, more in (("deferred", {}), ("forward", forward or {})):
-        one = make(SIZE, graph, set={**(settings or {}), **more})
-        if prepare:
-            prepare(one)
-        images.append(one.render(scene, vpls=vpls, seed=1).radiance)
-    return images
-
-
-def assert_equal(deferred, forward, hit, untrimmed=1e-6):
-    assert forward[hit].mean() > 1e-3
-    assert np.isfinite(deferred).all()
-    assert np.isfinite(forward).all()
-    assert rel_mse(deferred, forward, hit, trim=1e-3) < 1e-6
-    assert rel_mse(deferred, forward, hit) < untrimmed
-    assert share_off(deferred, forward, hit) < 1e-3
-    assert deferred[hit].mean() == pytest.approx(forward[hit].mean(), rel=5e-4)
-
-
 @pytest.mark.parametrize("name", [name for name, _ in builtin_scenes()])
 @pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
 def test_on_built_in_scenes(renderer, name, projection):
     scene = scene_named(name)
     # Depth goes by interpolated map coordinates there, which round differently in a tile: a pixel or two at an edge.
     untrimmed = 1e-4 if projection == "paraboloid" else 1e-6
-    assert_equal(*both(renderer, scene, {"shadow_maps.projection": projection}), hit(name, scene), untrimmed)
+    assert_equivalent(
+        *render_both(renderer, scene, {"shadow_maps.projection": projection}), hit_pixels(name, scene), untrimmed
+    )
 
 
 @pytest.mark.parametrize("fov", [139.0, 141.0, 179.0])
@@ -114,7 +85,7 @@ def test_on_built_in_scenes(renderer, name, projection):
 def test_with_a_wide_spotlight(renderer, fov, kernel):
     scene = scene_named("room")
     scene = replace(scene, spotlight=replace(scene.spotlight, fov=fov))
-    assert_equal(*both(renderer, scene, {"shadow_maps.spot_kernel": kernel}), hit("room", scene))
+    assert_equivalent(*render_both(renderer, scene, {"shadow_maps.spot_kernel": kernel}), hit_pixels("room", scene))
 
 
 @pytest.mark.parametrize("fov", [90.0, 150.0])
@@ -131,7 +102,7 @@ def test_with_a_wide_spotlight(renderer, fov, kernel):
 def test_with_a_disc_for_a_spotlight(renderer, fov, settings):
     scene = scene_named("room")
     scene = replace(scene, spotlight=replace(scene.spotlight, fov=fov, radius=0.15))
-    assert_equal(*both(renderer, scene, settings), hit("room", scene))
+    assert_equivalent(*render_both(renderer, scene, settings), hit_pixels("room", scene))
 
 
 def test_on_albedos_that_are_not_exact_in_8_bits(renderer, tmp_path):
@@ -144,7 +115,7 @@ def test_on_albedos_that_are_not_exact_in_8_bits(renderer, tmp_path):
         (0.03, 0.1234, 0.7071),
         (0.9, 0.03, 0.333),
     }
-    assert_equal(*both(renderer, scene), hit("odd", scene))
+    assert_equivalent(*render_both(renderer, scene), hit_pixels("odd", scene))
 
 
 OPTIONS = [
@@ -175,7 +146,7 @@ OPTIONS = [
 @pytest.mark.parametrize("settings", OPTIONS, ids=str)
 def test_under_options_that_both_share(renderer, settings):
     scene = scene_named("room")
-    assert_equal(*both(renderer, scene, settings), hit("room", scene))
+    assert_equivalent(*render_both(renderer, scene, settings), hit_pixels("room", scene))
 
 
 @pytest.mark.parametrize("settings", OPTIONS, ids=str)
@@ -192,14 +163,14 @@ def test_those_options_do_something(renderer, settings):
 def test_with_any_number_of_lights_in_a_draw(renderer, lights, name):
     scene = scene_named(name)
     forward = {"forward.lights_per_draw": lights}
-    assert_equal(*both(renderer, scene, forward=forward), hit(name, scene))
+    assert_equivalent(*render_both(renderer, scene, forward=forward), hit_pixels(name, scene))
 
 
 @pytest.mark.parametrize("lights", [1, 7])
 def test_with_more_lights_than_a_block_holds(renderer, lights):
     scene = scene_named("room")
     settings, forward = {"shadow_maps.vpl_size": 64}, {"forward.lights_per_draw": lights}
-    assert_equal(*both(renderer, scene, settings, forward=forward, vpls=260), hit("room", scene))
+    assert_equivalent(*render_both(renderer, scene, settings, forward=forward, vpls=260), hit_pixels("room", scene))
 
 
 def without_clip_control(one):
@@ -218,7 +189,7 @@ def without_layers_from_vertex(one):
 @pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
 def test_on_drivers_that_offer_less(renderer, name, prepare, projection):
     scene, settings = scene_named(name), {"shadow_maps.projection": projection}
-    deferred, forward = both(renderer, scene, settings, prepare=prepare)
-    assert_equal(deferred, forward, hit(name, scene))
+    deferred, forward = render_both(renderer, scene, settings, prepare=prepare)
+    assert_equivalent(deferred, forward, hit_pixels(name, scene))
     full = renderer(SIZE, set=settings).render(scene, vpls=VPLS, seed=1).radiance
-    assert_equal(deferred, full, hit(name, scene), untrimmed=1e-5)
+    assert_equivalent(deferred, full, hit_pixels(name, scene), untrimmed=1e-5)

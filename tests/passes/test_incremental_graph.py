@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shadow_atlas import read_atlas, read_vpl_maps
 from small_scenes import build, plane, room
 
 from deferred_ir.base.errors import GraphError
@@ -24,20 +25,6 @@ def moved(scene, step):
     return replace(scene, spotlight=replace(scene.spotlight, position=(x + 0.06 * step, y - 0.02 * step, z)))
 
 
-def atlas_of(one):
-    with one.gpu.ctx:
-        return one.executor.resource(("shadow_maps", "atlas")).read()[..., 0]
-
-
-def tiles_of(one, size=32):
-    """Maps of the VPLs that are alive, by tile."""
-    atlas = atlas_of(one)
-    per_row = atlas.shape[1] // size
-    tiles = one.executor.resource(("vpl", "lights")).records["tile"][1:].astype(int)
-    rows = atlas.reshape(len(atlas), per_row, size, per_row, size).swapaxes(2, 3)
-    return {tile: rows[1 + tile // per_row**2, tile % per_row**2 // per_row, tile % per_row] for tile in tiles}
-
-
 @pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
 @pytest.mark.parametrize("layer_from_vertex", [True, False])
 def test_kept_maps_hold_what_maps_drawn_anew_hold(renderer, projection, layer_from_vertex):
@@ -48,15 +35,15 @@ def test_kept_maps_hold_what_maps_drawn_anew_hold(renderer, projection, layer_fr
     for step in range(9):
         one.draw(moved(ROOM, step), plan)
         assert one.executor.counters["maps_drawn"] <= 1 + 8
-    kept, spot = tiles_of(one), atlas_of(one)[0]
+    kept, spot = read_vpl_maps(one), read_atlas(one)[0]
     assert len(kept) > 16
     one.executor.resource(("shadow_maps", "atlas")).kept = None
     one.draw(moved(ROOM, 8), plan)
     assert one.executor.counters["maps_drawn"] == 1 + len(kept)
-    anew = tiles_of(one)
+    anew = read_vpl_maps(one)
     assert kept.keys() == anew.keys()
     assert all((kept[tile] == anew[tile]).all() for tile in kept)
-    assert (atlas_of(one)[0] == spot).all()
+    assert (read_atlas(one)[0] == spot).all()
 
 
 def test_tiles_of_every_block_of_lights_are_kept(renderer):
@@ -66,11 +53,11 @@ def test_tiles_of_every_block_of_lights_are_kept(renderer):
     plan = one.plan(ROOM)
     one.draw(ROOM, plan)
     assert one.executor.counters["maps_drawn"] == 1 + count
-    first = tiles_of(one, 16)
+    first = read_vpl_maps(one, 16)
     one.draw(moved(ROOM, 1), plan)
     assert one.executor.counters["maps_drawn"] < count
     lights = one.executor.resource(("vpl", "lights"))
-    same = [tile for tile in tiles_of(one, 16) if (first.get(tile) == tiles_of(one, 16)[tile]).all()]
+    same = [tile for tile in read_vpl_maps(one, 16) if (first.get(tile) == read_vpl_maps(one, 16)[tile]).all()]
     assert len(same) > count // 2
     assert len(np.unique(lights.records["tile"])) == len(lights.records)
 

@@ -10,8 +10,7 @@ from fixed_lights import lit_by, spot_record, vpl_records
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from map_rays import tiles, wrong_texels
-from small_scenes import build
-from test_clusters import soup
+from small_scenes import build, triangle_soup
 
 from deferred_ir.frame.light_buffer import off_surface
 from deferred_ir.loading.load import builtin_scenes, load
@@ -28,7 +27,7 @@ BUILT_IN = [name for name, _ in builtin_scenes()]
 
 @lru_cache(maxsize=2)
 def traced(name: str):
-    scene = build(soup(int(name))) if name.isdigit() else load(name)
+    scene = build(triangle_soup(int(name))) if name.isdigit() else load(name)
     return scene, Tracer(scene)
 
 

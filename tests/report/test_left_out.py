@@ -6,8 +6,7 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
-from small_scenes import room, smooth_scene
-from test_leaving_out import SIZE, gable
+from small_scenes import gable, room, smooth_scene
 
 from deferred_ir.base.errors import DeviceError
 from deferred_ir.engine.accumulation import Accumulation
@@ -16,6 +15,8 @@ from deferred_ir.gl.textures import FORMATS, GpuTexture
 from deferred_ir.graph.ports import Texture
 from deferred_ir.profiling.studies import left_out
 from deferred_ir.report import left_out as savings
+
+SIZE = (48, 48)
 
 
 def told(renderer, scene, graph, outputs=None, **settings):

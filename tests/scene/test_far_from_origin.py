@@ -7,31 +7,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_scenes import FAR, move_away
 
 from deferred_ir import load
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.motion import CameraMotion
-from deferred_ir.scene.scene import Scene, moved
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.reference import reference
-
-FAR = (1e5, -2e5, 3e5)
-
-
-def away(scene: Scene, by: tuple[float, float, float] = FAR) -> Scene:
-    geometry = replace(scene.geometry, positions=scene.geometry.positions + by)
-    return replace(scene, geometry=geometry, camera=moved(scene.camera, by), spotlight=moved(scene.spotlight, by))
 
 
 def test_a_scene_near_the_origin_stays_as_it_is() -> None:
     scene = load("cornell")
     assert scene.centred is scene
-    assert away(scene, (2.0, 0.0, 0.0)).geometry.centre == (0, 0, 0)
+    assert move_away(scene, (2.0, 0.0, 0.0)).geometry.centre == (0, 0, 0)
 
 
 def test_a_scene_far_away_is_moved_in_64_bits() -> None:
-    scene, far = load("cornell"), away(load("cornell"))
+    scene, far = load("cornell"), move_away(load("cornell"))
     centred = far.centred
     middle = scene.geometry.middle
     assert centred.centred is centred
@@ -45,13 +38,13 @@ def test_a_scene_far_away_is_moved_in_64_bits() -> None:
 def test_a_picture_is_the_same_far_from_the_origin(renderer, graph: str) -> None:
     scene = load("cornell")
     made: Renderer = renderer((64, 64), graph, set={"vpl.count": 8})
-    near, far = made.render(scene).radiance, made.render(away(scene)).radiance
+    near, far = made.render(scene).radiance, made.render(move_away(scene)).radiance
     assert relmse(far, near)[0] < 1e-5
 
 
 def test_a_reference_is_the_same_far_from_the_origin() -> None:
     scene = load("cornell")
-    near, far = (reference(each, (32, 32), vpls=8).radiance for each in (scene, away(scene)))
+    near, far = (reference(each, (32, 32), vpls=8).radiance for each in (scene, move_away(scene)))
     assert relmse(far, near)[0] < 1e-5
 
 
@@ -60,7 +53,7 @@ def test_a_moving_camera_far_from_the_origin(renderer) -> None:
     position, look_at = scene.camera.position, scene.camera.look_at
     there = tuple(np.add(position, (0.1, 0.0, 0.0)).tolist())
     motion = CameraMotion((0.0, 1.0), (position, there), (look_at, look_at))
-    far = away(scene)
+    far = move_away(scene)
     shifted = CameraMotion(
         (0.0, 1.0), *(tuple(tuple(np.add(p, FAR)) for p in ps) for ps in ((position, there), (look_at, look_at)))
     )

@@ -47,3 +47,14 @@ def source(format: str = "rgba8", **more: str) -> tuple[Pass, Mapping[str, str]]
 
 def names(plan: Plan) -> list[str]:
     return [step.name for step in plan.steps]
+
+
+def diamond() -> Graph:
+    """A graph in which two passes read the first one's output and a later pass reads both."""
+    return graph(
+        end=(Fake(reads("l", "r")), {"l": "left.out", "r": "right.out"}),
+        left=(Fake(reads("x")), {"x": "start.out"}),
+        right=(Fake(reads("x")), {"x": "start.out"}),
+        start=source(),
+        last=(Fake(reads("x")), {"x": "end.out"}),
+    )

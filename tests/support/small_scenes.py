@@ -12,9 +12,11 @@ import numpy as np
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.motion import ModelMotion
-from deferred_ir.scene.scene import Geometry, Material, Model, Scene, Texture
+from deferred_ir.scene.scene import Geometry, Material, Model, Scene, Texture, moved
 
 GREY = (0.5, 0.5, 0.5)
+FAR = (1e5, -2e5, 3e5)
+"""Far enough from the origin for 32-bit coordinates to lose small features."""
 
 
 @dataclass(frozen=True)
@@ -149,3 +151,30 @@ def scaled(scene: Scene, factor: float) -> Scene:
         camera=replace(scene.camera, position=point(scene.camera.position), look_at=point(scene.camera.look_at)),
         spotlight=replace(light, position=point(light.position), look_at=point(light.look_at), emission=emission),
     )
+
+
+def move_away(scene: Scene, by: tuple[float, float, float] = FAR) -> Scene:
+    """`scene` somewhere else: vertices, camera and light moved by the same vector."""
+    geometry = replace(scene.geometry, positions=scene.geometry.positions + by)
+    return replace(scene, geometry=geometry, camera=moved(scene.camera, by), spotlight=moved(scene.spotlight, by))
+
+
+def gable() -> Scene:
+    """A roof below the light: the camera sees one slope and the wall it faces; the other slope faces away."""
+    return build(
+        quad((-1, -1, 1), (0, 0, 1), (0, 0, -1), (0.7, 0.2, 0.1)),
+        quad((0.3, -0.3, 1), (2.5, -2.5, 1), (2.5, -2.5, -1)),
+        quad((4, -4, 4), (4, 2, 4), (4, 2, -4), (0.2, 0.3, 0.8)),
+        camera=Camera((1, 1, 0.2), (2.5, -1.5, 0), fov=60.0),
+        spotlight=Spotlight((0.1, 1.6, 0.1), (0.1, -1.0, 0.0), 100.0, (3.0, 2.5, 2.0)),
+    )
+
+
+def triangle_soup(seed: int, count: int = 300, scale: float = 1.0, offset: float = 0.0) -> Mesh:
+    """Triangles from a ten-thousandth of the scene to ten times its size, slivers and degenerate ones among them."""
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-4, 1, (count, 1, 1))
+    corners = rng.uniform(-1, 1, (count, 1, 3)) + size * rng.normal(size=(count, 3, 3))
+    corners[::17, 2] = corners[::17, 1]
+    corners[1::17, 2] = corners[1::17, 0] * 0.5 + corners[1::17, 1] * 0.5
+    return Mesh(corners.reshape(-1, 3) * scale + offset, np.arange(3 * count).reshape(-1, 3))

@@ -1,19 +1,19 @@
-"""Values as TOML text, for files that tests make up."""
+"""Writing values as TOML, for tests that generate files."""
 
 from __future__ import annotations
 
 import json
 
 
-def toml(value: object) -> str:
-    """A value as inline TOML: JSON, but for floats, tables and dates (for None)."""
+def to_toml(value: object) -> str:
+    """Return a value as inline TOML: JSON but for floats, tables and None, which becomes a date."""
     match value:
         case None:
             text = "1979-05-27"
         case list():
-            text = f"[{', '.join(toml(item) for item in value)}]"
+            text = f"[{', '.join(to_toml(item) for item in value)}]"
         case dict():
-            text = f"{{{', '.join(f'{toml(key)} = {toml(item)}' for key, item in value.items())}}}"
+            text = f"{{{', '.join(f'{to_toml(key)} = {to_toml(item)}' for key, item in value.items())}}}"
         case float():
             text = repr(value)
         case _:

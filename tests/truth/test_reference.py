@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from small_scenes import Mesh, box, build, plane, quad, room, scaled, sphere
-from test_architecture import imports
+from source_imports import imports
 
 from deferred_ir.base.errors import SettingError
 from deferred_ir.graph.file import load_graph

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from test_vpls import mean_cone
+from closed_forms import mean_cone_factor
 
 from deferred_ir.sampling.patterns import disc, unit_disc
 from deferred_ir.scene.lights.spot import Spotlight, frames
@@ -39,7 +39,7 @@ def test_a_part_of_the_disc_gets_its_share_of_the_light(fov):
     even = unit_disc("sobol", 2**16, 0) * math.sin(math.radians(fov) / 2)
     directions = lift_to_hemisphere(even, light.axis[None])
     points, sent = emission.points(directions), light.cone(directions) / len(even)
-    assert emission.power == pytest.approx(math.sin(math.radians(fov) / 2) ** 2 * mean_cone(fov))
+    assert emission.power == pytest.approx(math.sin(math.radians(fov) / 2) ** 2 * mean_cone_factor(fov))
     inner = [sent[np.linalg.norm(points, axis=1) < radius].sum() / sent.sum() for radius in (0.3, 0.6, 0.9, 0.98)]
     np.testing.assert_allclose(inner, np.square([0.3, 0.6, 0.9, 0.98]), rtol=3e-3)
     assert sent[points[:, 0] > 0].sum() / sent.sum() == pytest.approx(0.5, rel=3e-3)

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_forms import mean_cone_factor
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_scenes import box, build, plane, room
-from test_vpls import mean_cone
 
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
@@ -106,7 +106,7 @@ def test_the_power_is_that_of_the_light(count):
     state = IncrementalVpls(count, seed=3)
     vpls = frames(state, [LIGHT] * (count // 8))[-1]
     assert len(vpls) == count
-    expected = np.array(LIGHT.emission) * math.sin(math.radians(50)) ** 2 * ALBEDO * mean_cone(100)
+    expected = np.array(LIGHT.emission) * math.sin(math.radians(50)) ** 2 * ALBEDO * mean_cone_factor(100)
     np.testing.assert_allclose(vpls.emission.sum(axis=0), expected, rtol=1e-6)
 
 

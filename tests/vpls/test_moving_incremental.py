@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from moving_scenes import AROUND, UP, VECTORS, WALLS, bake, pose_matrix, room_with_moving_block, room_with_moving_models
+from shadow_atlas import read_atlas, read_vpl_maps
 from small_scenes import box, build
-from test_incremental_graph import SETTINGS, atlas_of, tiles_of
-from test_moving_models import AROUND, SIZE, UP, WALLS, baked, one_block, pose, two, vectors
 
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.geometry import carried
@@ -19,9 +19,11 @@ from deferred_ir.scene.motion import ModelMotion
 from deferred_ir.vpls.keep import FARTHEST, IncrementalVpls
 from deferred_ir.vpls.stale_maps import StaleMaps
 
+SIZE = (48, 32)
+SETTINGS = {"vpl.count": 24, "shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}
 LIGHT = Spotlight((-0.4, 0.9, 0.3), (0.1, -1.0, -0.1), 110.0, (3.0, 2.5, 2.0))
 STILL = (0.0, 0.0, 0.0, 1.0)
-SCENE = two()
+SCENE = room_with_moving_models()
 TRACER = Tracer(SCENE.at(0.0))
 
 
@@ -31,7 +33,7 @@ def corners(box_of: np.ndarray) -> np.ndarray:
 
 @settings(max_examples=15)
 @given(
-    steps=st.lists(st.one_of(st.none(), st.tuples(st.integers(0, 1), vectors, vectors)), min_size=2, max_size=10),
+    steps=st.lists(st.one_of(st.none(), st.tuples(st.integers(0, 1), VECTORS, VECTORS)), min_size=2, max_size=10),
     budget=st.sampled_from([(0, 0), (0, 1), (4, 8), (2, 3), (48, 48)]),
     seed=st.integers(0, 99),
 )
@@ -45,7 +47,7 @@ def test_what_holds_in_every_frame(steps, budget, seed):
     for step in steps:
         before, poses = geometry, poses.copy()
         if step:
-            poses[step[0]] = pose(3 * np.array(step[1]), 0.6 * np.array(step[2]))
+            poses[step[0]] = pose_matrix(3 * np.array(step[1]), 0.6 * np.array(step[2]))
         geometry = SCENE.geometry.posed(poses)
         TRACER.follow(replace(SCENE, geometry=geometry))
         version, used, group, position = (a.copy() for a in (one.version, one.used, one._group, one.position))
@@ -215,7 +217,7 @@ def test_a_vpl_on_a_model_that_jumps_is_given_up():
 @pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
 def test_maps_at_rest_hold_what_maps_drawn_anew_hold(renderer, projection):
     """And never more are drawn than the budget allows, the spotlight's besides."""
-    scene = two()
+    scene = room_with_moving_models()
     one = renderer(SIZE, "incremental", set={**SETTINGS, "shadow_maps.projection": projection})
     plan = one.plan(scene)
     for step in range(12):
@@ -226,27 +228,27 @@ def test_maps_at_rest_hold_what_maps_drawn_anew_hold(renderer, projection):
         if one.executor.counters["maps_drawn"] == 0:
             break
     assert one.executor.counters["maps_drawn"] == 0
-    kept, spot = tiles_of(one), atlas_of(one)[0]
+    kept, spot = read_vpl_maps(one), read_atlas(one)[0]
     assert len(kept) > 16
     one.executor.resource(("shadow_maps", "atlas")).kept = None
     one.draw(scene, plan, time=12 / 30)
     assert one.executor.counters["maps_drawn"] == 1 + len(kept)
-    anew = tiles_of(one)
+    anew = read_vpl_maps(one)
     assert all((kept[tile] == anew[tile]).all() for tile in kept)
-    assert (atlas_of(one)[0] == spot).all()
+    assert (read_atlas(one)[0] == spot).all()
 
 
 def test_direct_light_never_lags(renderer):
-    scene = one_block()
+    scene = room_with_moving_block()
     one, other = renderer(SIZE, "incremental", set={**SETTINGS, "vpl.most": 0, "vpl.least": 0}), renderer(SIZE)
     other.configure(set={"shadow_maps.spot_size": 128})
     for step in range(4):
         found = one.render(scene, time=step / 10).radiance
-        np.testing.assert_array_equal(found, other.render(baked(scene, step / 10), vpls=0).radiance)
+        np.testing.assert_array_equal(found, other.render(bake(scene, step / 10), vpls=0).radiance)
 
 
 def test_a_seed_gives_the_same_frames_again(renderer):
-    scene, runs = two(), []
+    scene, runs = room_with_moving_models(), []
     one = renderer(SIZE, "incremental", set=SETTINGS)
     plan = one.plan(scene)
     for _ in range(2):
@@ -261,7 +263,7 @@ def test_a_seed_gives_the_same_frames_again(renderer):
 
 def test_with_the_whole_budget_it_is_as_good_as_afresh(renderer):
     """All stale maps are drawn at once: what is left of the difference is that of two sets of VPLs."""
-    scene = one_block()
+    scene = room_with_moving_block()
     one = renderer(SIZE, "incremental", set={**SETTINGS, "vpl.most": 64, "vpl.count": 64, "vpl.least": 0})
     plan = one.plan(scene)
     for step in range(6):

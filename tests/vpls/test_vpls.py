@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_forms import mean_cone_factor
 from small_scenes import box, build, plane, room, scaled, sphere, textured
 
 from deferred_ir.rays.tracer import Tracer
@@ -22,22 +23,12 @@ LIGHT = Spotlight((0.1, 0.2, -0.1), (0.3, -1.0, 0.4), 100.0, (3.0, 2.0, 1.0))
 CLOSED = build(box((-1, -1, -1), (1, 1, 1), ALBEDO), spotlight=LIGHT)
 
 
-def mean_cone(fov: float) -> float:
-    """The mean of the cone factor over the disc of directions, by its closed form.
-
-    With s = 1 - cos theta and e = 1 - cos(fov/2) the disc's area element is 2 pi (1 - s) ds, the factor 1 up to 3e/4
-    and 4 (1 - s/e) from there to e.
-    """
-    e = 2 * math.sin(math.radians(fov) / 4) ** 2
-    flat = 0.75 * e - (0.75 * e) ** 2 / 2
-    edge = 4 * ((e - e**2 / 2 - flat) - ((e**2 / 2 - e**3 / 3) - ((0.75 * e) ** 2 / 2 - (0.75 * e) ** 3 / 3)) / e)
-    return (flat + edge) / (e - e**2 / 2)
-
-
 def test_the_closed_form_is_that_of_the_spotlights_own_cone():
     points = disc(np.random.default_rng(0).random((400_000, 2))) * math.sin(math.radians(50))
     directions = np.column_stack([points, np.sqrt(1 - (points**2).sum(axis=1))])
-    assert Spotlight((0, 0, 0), (0, 0, 1), 100.0).cone(directions).mean() == pytest.approx(mean_cone(100), rel=3e-3)
+    assert Spotlight((0, 0, 0), (0, 0, 1), 100.0).cone(directions).mean() == pytest.approx(
+        mean_cone_factor(100), rel=3e-3
+    )
 
 
 @pytest.mark.parametrize("fov", [0.1, 30.0, 100.0, 160.0, 179.99])
@@ -45,7 +36,7 @@ def test_a_closed_room_gives_back_all_that_the_light_sends(fov):
     light = replace(LIGHT, fov=fov)
     lights = cast(light, Tracer(CLOSED), 16384, "sobol", seed=1)
     r = math.sin(math.radians(fov) / 2)
-    expected = np.array(light.emission) * r**2 * ALBEDO * mean_cone(fov)
+    expected = np.array(light.emission) * r**2 * ALBEDO * mean_cone_factor(fov)
     np.testing.assert_allclose(lights.emission.sum(axis=0), expected, rtol=1e-3)
 
 
@@ -54,7 +45,7 @@ def test_a_closed_room_gives_back_all_that_the_light_sends(fov):
 def test_every_pattern_and_count_is_unbiased(pattern, count):
     tracer, seeds = Tracer(CLOSED), max(1000 // count, 60)
     sums = [cast(LIGHT, tracer, count, pattern, seed).emission.sum(axis=0) for seed in range(seeds)]
-    expected = np.array(LIGHT.emission) * math.sin(math.radians(50)) ** 2 * ALBEDO * mean_cone(100)
+    expected = np.array(LIGHT.emission) * math.sin(math.radians(50)) ** 2 * ALBEDO * mean_cone_factor(100)
     np.testing.assert_allclose(np.mean(sums, axis=0), expected, rtol=0.05)
 
 
@@ -149,7 +140,7 @@ def test_the_inside_of_a_tessellated_sphere_keeps_the_energy(smooth):
     ball = replace(sphere(1.0, 4), albedo=ALBEDO)
     scene = build(ball if smooth else replace(ball, normals=None))
     lights = cast(LIGHT, Tracer(scene), 16384, "sobol")
-    expected = np.array(LIGHT.emission) * math.sin(math.radians(50)) ** 2 * ALBEDO * mean_cone(100)
+    expected = np.array(LIGHT.emission) * math.sin(math.radians(50)) ** 2 * ALBEDO * mean_cone_factor(100)
     np.testing.assert_allclose(lights.emission.sum(axis=0), expected, rtol=2e-3)
     assert len(lights) > 16000
 

@@ -12,7 +12,7 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, radians, sin
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
-from deferred_ir.vpls.shares import share_starts
+from deferred_ir.vpls.shares import SharesMeta, share_starts
 
 IRRADIANCE, THIN, COUNT, MISSING = range(4)
 """Image units that the shaders declare."""
@@ -45,10 +45,18 @@ class Params:
     )
 
 
+@dataclass
+class State:
+    """From what the neighbours that count were found, None if that is not known."""
+
+    windows: tuple[Any, ...] | None = None
+
+
 class Gather(Pass):
     """A box filter that stops at edges."""
 
     Params = Params
+    State = State
     inputs: ClassVar[Mapping[str, Input]] = {
         "vpls": Input("the VPLs in the order of their shares", format="share"),
         "shares": Input("irradiance in sub-buffers", format="rgba32f"),
@@ -79,12 +87,12 @@ class Gather(Pass):
         for unit, name in ((IRRADIANCE, "irradiance"), (THIN, "thin"), (COUNT, "count"), (MISSING, "missing")):
             io[name].bind_image(unit)
         io["count"].upload([[0]])
-        angle, shares = radians(self.params.angle), int(io.defines["INTERLEAVE"]) ** 2
+        angle, shares = radians(self.params.angle), io.meta("vpls", SharesMeta).n ** 2
         # An even window is off centre: in frames with fresh seeds to all sides, so that their mean is not.
         side = frame.seed & 1, frame.seed >> 1 & 1
         drawn = io["depth"].version, io["normals"].version
         windows = (*drawn, shares, self.params, side) if frame.reuse else None
-        known = windows is not None and io["missing"].kept == windows
+        known = windows is not None and io.state.windows == windows
         defines = shader_variants.of_pixels(frame, vpls.records)
         kept = {"SMOOTH": defines["SMOOTH"], "KEEP": int(frame.reuse), "KNOWN": int(known)}
         program = io.program("gather.frag", defines=kept)
@@ -94,9 +102,9 @@ class Gather(Pass):
             fewest=self.params.fewest * shares,
             side=side,
         )
-        io["missing"].kept = None
+        io.state.windows = None
         program.draw_fullscreen()
-        io["missing"].kept = windows
+        io.state.windows = windows
         if io["rays"]:
             gpu.barrier()
             return

@@ -1,8 +1,7 @@
 """VPLs that outlive their frame (Laine et al. 2007): -> lights, as the pass vpl writes them, and which of them are new.
 
 A few VPLs are new in each frame, the others stay where they are and keep their tile of the atlas, so that only the new
-ones need a map. What stays lives with the light buffer; it ends where scene, seed or parameters are others, or the
-spotlight is turned off.
+ones need a map. They end where scene, seed or parameters are others, or the spotlight is turned off.
 """
 
 from __future__ import annotations
@@ -31,10 +30,19 @@ class Params(VplParams):
     most: int = param(8, lo=0, hi=65536, doc="Most new VPLs in a frame, and so most maps of VPLs that it draws.")
 
 
+@dataclass
+class State:
+    """The VPLs so far, and the parameters and the seed that they were made with."""
+
+    key: tuple[Params, int] | None = None
+    vpls: IncrementalVpls | None = None
+
+
 class IncrementalVpl(Pass):
     """Keeps the VPLs that the spotlight still reaches, casts a few new ones and packs them for the shaders."""
 
     Params = Params
+    State = State
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """One buffer with room for the spotlight and a VPL for each ray."""
@@ -59,24 +67,22 @@ class IncrementalVpl(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Go on from what the last frame left, pack, upload."""
-        light, p, lights = frame.scene.spotlight, self.params, io["lights"]
+        light, p, lights, state = frame.scene.spotlight, self.params, io["lights"], io.state
         if p.count == 0 or not any(light.emission):
-            lights.kept = None
+            state.vpls = None
             lights.write(packed(frame.scene, NONE, p, NONE.ray))
             return
         key = p, frame.seed
-        before, state = lights.kept or (None, None)
-        if state is None or before != key:
-            state = IncrementalVpls(p.count, frame.seed)
-        lights.kept = None  # an update that is broken off leaves nothing to go on from
-        vpls = state.update(light, frame.tracer(), least=p.least, most=p.most)
-        lights.kept = key, state
-        if not state.at_rest:
+        all_vpls = state.vpls if state.vpls and state.key == key else IncrementalVpls(p.count, frame.seed)
+        state.vpls = None  # an update that is broken off leaves nothing to go on from
+        vpls = all_vpls.update(light, frame.tracer(), least=p.least, most=p.most)
+        state.key, state.vpls = key, all_vpls
+        if not all_vpls.at_rest:
             io.repeat()
-        versions = np.append(state.spot_version(light), state.version[vpls.ray])
+        versions = np.append(all_vpls.spot_version(light), all_vpls.version[vpls.ray])
         lights.write(packed(frame.scene, vpls, p, vpls.ray), versions)
-        io.state("vpls_alive", len(vpls))
-        io.state("vpls_waiting", state.waiting)
+        io.report("vpls_alive", len(vpls))
+        io.report("vpls_waiting", all_vpls.waiting)
 
 
 PASS = IncrementalVpl

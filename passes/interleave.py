@@ -15,7 +15,7 @@ from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output
-from deferred_ir.vpls.shares import dealt, share_starts
+from deferred_ir.vpls.shares import SharesMeta, dealt, share_starts
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,8 @@ class Interleave(Pass):
         if n & (n - 1):
             raise GraphError(f"n {n}: wants 1, 2, 4 or 8")
         vpls = Buffer("share", lights.records, lights.stride, lights.block, parts=n * n)
-        return {
-            "vpls": Output(
-                "the VPLs in the order of their shares", vpls, {"INTERLEAVE": n, "LIGHTS_PER_BLOCK": lights.block}
-            )
-        }
+        defines = {"INTERLEAVE": n, "LIGHTS_PER_BLOCK": lights.block}
+        return {"vpls": Output("the VPLs in the order of their shares", vpls, defines, meta=SharesMeta(n))}
 
     def informed(self, facts: Facts) -> Facts:
         """How the VPLs are dealt."""

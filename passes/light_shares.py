@@ -15,7 +15,7 @@ from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
-from deferred_ir.vpls.shares import share_starts, sub_buffers
+from deferred_ir.vpls.shares import SharesMeta, share_starts, sub_buffers
 
 
 class Interleaved(Pass):
@@ -45,7 +45,7 @@ class Interleaved(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """A draw for each share, or more where it crosses from block to block of the buffer."""
-        vpls, n = io["vpls"], int(io.defines["INTERLEAVE"])
+        vpls, n = io["vpls"], io.meta("vpls", SharesMeta).n
         ctx, block = io.gpu.ctx, vpls.description.block
         program = io.program("light_shares.frag", defines=shader_variants.of_pixels(frame, vpls.records))
         ctx.blend_func = ctx.ONE, ctx.ONE

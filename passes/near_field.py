@@ -12,11 +12,13 @@ from math import sqrt
 from typing import ClassVar
 
 from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.light_buffer import LightsMeta
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.vpls.clamp_residual import VplLimits, residual
+from deferred_ir.vpls.shares import SharesMeta
 
 
 @dataclass(frozen=True)
@@ -69,8 +71,8 @@ class NearField(Pass):
             frame.size,
             VplLimits(clamp=sqrt(vpl["clamp_squared"][0]), cosine=1 - float(vpl["one_minus_cos"][0])),
             samples=self.params.samples,
-            block=int(io.defines.get("INTERLEAVE", 1)),
-            bounces=int(io.defines["BOUNCES"]),
+            block=io.meta("vpls", SharesMeta).n if io["vpls"] else 1,
+            bounces=io.meta("lights", LightsMeta).bounces,
             seed=frame.seed,
         )
         io["residual"].upload(image)

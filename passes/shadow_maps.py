@@ -15,11 +15,11 @@ import numpy as np
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.pass_base import NO_PORTS, Facts, Pass
+from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 from deferred_ir.shadows import mesh_choice, paraboloid
-from deferred_ir.shadows.atlas_cache import KeptMaps
+from deferred_ir.shadows.atlas_cache import AtlasCache
 from deferred_ir.shadows.settings import MapParams
 
 
@@ -27,6 +27,7 @@ class ShadowMaps(Pass):
     """Depth as each light sees it."""
 
     Params = MapParams
+    State = AtlasCache
     inputs: ClassVar[Mapping[str, Input]] = {
         "lights": Input("the lights to draw maps for", format="light"),
         "rays": Input("which lights are seen, by rays: then none needs a map", optional=True, replaces=True),
@@ -63,7 +64,7 @@ class ShadowMaps(Pass):
         return frozenset({"models"})
 
     def subpasses(
-        self, inputs: Mapping[str, Description | None], ports: Mapping[str, Any] = NO_PORTS
+        self, inputs: Mapping[str, Description | None], state: AtlasCache | None = None
     ) -> Sequence[Mapping[str, Any]]:
         """A sub-pass for each light that the buffer can hold; after a frame, for each that it holds."""
         per_layer, why = self._tiles_per_layer(), "no frame has drawn it yet"
@@ -74,12 +75,12 @@ class ShadowMaps(Pass):
             for i in range(_lights(inputs) - 1)
         ]
         parts = [{**tile, "state": "dirty", "why": why} for tile in [spot, *tiles]]
-        return ports["atlas"].kept.told(parts) if ports else parts
+        return state.describe(parts) if state and state.frame else parts
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Clear, then draw for each light what it may see, unless its map is there already."""
         gpu, lights = io.gpu, io["lights"]
-        kept = KeptMaps.of(io, self.params, all_tiles=frame.keep_all)
+        maps = AtlasCache.begin(io, self.params, all_tiles=frame.keep_all)
         self.params.prepare(gpu)
         geometry = [] if gpu.layer_from_vertex else ["shadow_maps/layer.geom"]
         program = io.program("shadow_maps/depth.frag", "shadow_maps/planar.vert", *geometry)
@@ -87,7 +88,7 @@ class ShadowMaps(Pass):
         for start in range(0, total, LIGHTS_PER_BLOCK):
             lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
             records = lights.records[start : min(start + LIGHTS_PER_BLOCK, total)]
-            curved, dirty = self.params.paraboloid(records), kept.dirty[start : start + len(records)]
+            curved, dirty = self.params.paraboloid(records), maps.dirty[start : start + len(records)]
             for mesh, share in mesh_choice.shares(frame, self.params, records):
                 drawn = share & dirty
                 if (drawn & ~curved).any():
@@ -96,8 +97,8 @@ class ShadowMaps(Pass):
                     mesh.draw(program, mesh.clusters.visible(records[planar]), planar)
                 if (drawn & curved).any():
                     paraboloid.draw(mesh, io, self.params, records, drawn & curved, layered=True)
-        kept.remember()
-        io.count("maps_drawn", int(kept.dirty.sum()))
+        io.state.remember()
+        io.count("maps_drawn", int(maps.dirty.sum()))
         if total > 1:
             mesh_choice.count(frame, io, self.params)
 

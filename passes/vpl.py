@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_buffer import VplParams, map_versions, output, packed
+from deferred_ir.frame.light_buffer import MapVersions, VplParams, output, packed
 from deferred_ir.frame.light_culling import dropped, shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.params import param
@@ -35,6 +35,7 @@ class Vpl(Pass):
     """Traces `count` rays from the spotlight, or more and chooses, and packs what they make for the shaders."""
 
     Params = Params
+    State = MapVersions
 
     def __init__(self, params: Any = None) -> None:
         super().__init__(params)
@@ -62,8 +63,8 @@ class Vpl(Pass):
         if frame.by_view and any(light.emission):
             records = dropped(records, frame.buffers.clusters, frame.scene.camera, frame.size)
             io.count("lights_dropped", int((~shining(records)).sum()))
-        lights.write(records, map_versions(lights, records, frame.scene) if frame.reuse else None)
-        io.state("vpls_alive", len(vpls))
+        lights.write(records, io.state.update(records, frame.scene) if frame.reuse else None)
+        io.report("vpls_alive", len(vpls))
 
     def _cast(self, frame: Frame) -> Vpls:
         """The VPLs of a frame; with candidates, `count` of them, or more where further bounces bring more."""

@@ -1,7 +1,7 @@
 """Runs plans: allocates what `planning.compile` planned, binds each pass's ports by name, and times the passes.
 
-Resources are kept by (pass, port, description, type of pass) and survive a new plan that still has them; programs are
-kept by source and defines.
+Resources are held by (pass, port, description, type of pass) and survive a new plan that still has them, as does the
+state of a pass whose resources all survive. Programs are held by source and defines.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from deferred_ir.base.errors import DeviceError
 from deferred_ir.engine.reuse import Runs
 from deferred_ir.frame.frame import FRAME, Frame
-from deferred_ir.frame.pass_io import Io, Resource
+from deferred_ir.frame.pass_io import Io, Resource, new_state
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.shaders import ShaderLibrary
 from deferred_ir.gl.textures import Framebuffer, GpuBuffer, GpuTexture
@@ -37,7 +37,7 @@ class Watch(Protocol):
 
 
 Key = tuple[str, str, Description, tuple[int, int] | None, type[Pass]]
-"""Of a resource: pass, port, what it is, and who writes it, since what a pass keeps there another one cannot read."""
+"""Of a resource: pass, port, what it is, and the type of the pass, whose state describes what it holds."""
 
 
 class Executor:
@@ -57,6 +57,7 @@ class Executor:
         self._size, self._shares = (0, 0), False
         self.tenants: dict[tuple[str, str], tuple[str, str]] = {}
         self._ios: list[Io] = []
+        self._states: dict[str, tuple[type[Pass], Any]] = {}
         self._runs = Runs()
         self.kept: tuple[str, ...] = ()
         self.watch: Watch | None = None
@@ -79,9 +80,9 @@ class Executor:
         for step, io in zip(plan.steps, self._ios, strict=True):
             if steps is not None and step.name not in steps:
                 continue
-            standing = self._runs.standing(step, io, frame) if frame.reuse else None
-            if standing is not None:
-                self.counters.update(standing)
+            figures = self._runs.figures(step, io, frame) if frame.reuse else None
+            if figures is not None:
+                self.counters.update(figures)
                 kept.append(step.name)
                 continue
             self._runs.forget(step)
@@ -99,7 +100,7 @@ class Executor:
                 _touch(io[port])
             self._runs.remember(step, io, frame)
             self.counters.update(io.counters)
-            self.counters.update(io.standing)
+            self.counters.update(io.figures)
         self.kept = tuple(kept)
 
     def resource(self, source: tuple[str, str]) -> Any:
@@ -118,21 +119,16 @@ class Executor:
         """Whose the texture of `home` is at the end of a frame."""
         return next((source for source, of in reversed(self.tenants.items()) if of == home), home)
 
-    def ports(self, step: Step) -> dict[str, Any]:
-        """Resources that a step of the plan reads and writes, by port; those that others have by now are left out."""
-        sources = {port: source for port, source in step.sources.items() if source}
-        sources |= {port: (step.name, port) for port in step.outputs}
-        found = {}
-        for port, source in sources.items():
-            if self._last_tenant(self.tenants.get(source, source)) == source:
-                found[port] = self.resource(source)
-        return found
+    def state(self, name: str) -> Any:
+        """Return the state (`Pass.State`) of the pass `name`; None if it has none, or no frame has run it yet."""
+        return next((io.state for io in self._ios if io.step.name == name), None)
 
     def forget(self) -> None:
-        """Drop what passes keep from frame to frame; the next frame runs all of them."""
+        """Drop the states of all passes; the next frame runs each of them afresh."""
         self._runs.clear()
-        for resource in self._all():
-            resource.kept = None
+        self._states.clear()
+        for io in self._ios:
+            io.forget()
 
     def reload(self) -> bool:
         """Read the shader files again; whether one has changed. After a ShaderError the old programs go on."""
@@ -166,6 +162,8 @@ class Executor:
 
         shares: transient outputs have textures in common.
         """
+        if self._ios:
+            self._states = {io.step.name: (type(io.step.work), io.state) for io in self._ios}
         self._plan = None  # if an allocation fails, the next frame starts over
         self.tenants = alias_textures(plan) if shares else {}
         keys = {
@@ -179,26 +177,32 @@ class Executor:
         self._framebuffers, self._ios = [], []
         self.gpu.free_uniforms()
         for key in [key for key in self._resources if key not in keys]:
+            self._states.pop(key[0], None)
             _release(self._resources.pop(key))
         for key in sorted(keys - self._resources.keys(), key=lambda key: key[:2]):
+            self._states.pop(key[0], None)
             try:
                 self._resources[key] = self._make(key[2], size)
             except DeviceError as error:
                 raise DeviceError(f"{key[0]}.{key[1]}: {error}") from error
         ports = {key[:2]: resource for key, resource in self._resources.items()}
         ports |= {source: ports[home] for source, home in self.tenants.items()}
-        written = {(s.name, port): output.defines for s in plan.steps for port, output in s.outputs.items()}
+        written = {(s.name, port): output for s in plan.steps for port, output in s.outputs.items()}
+        ios = []
         for step in plan.steps:
             inputs = {port: ports[source] if source else None for port, source in step.sources.items()}
             outputs = {port: ports[step.name, port] for port in step.outputs}
-            io = Io(self.library, step, {**inputs, **outputs}, written)
+            kind, state = self._states.get(step.name, (None, None))
+            state = state if kind is type(step.work) else new_state(step.work)
+            io = Io(self.library, step, {**inputs, **outputs}, written, state)
             attached = {port: inputs[port] for port, declared in step.work.inputs.items() if declared.attach}
             drawn = {port: ports[step.name, port] for port, output in step.outputs.items() if output.attach}
             targets = {port: r for port, r in {**drawn, **attached}.items() if isinstance(r, GpuTexture)}
             if targets:
                 self._framebuffers.append(Framebuffer(self.gpu, targets, step.name))
                 io.attach(self._framebuffers[-1])
-            self._ios.append(io)
+            ios.append(io)
+        self._ios = ios
         self._plan, self._size, self._shares = plan, size, shares
 
     def _make(self, description: Description, size: tuple[int, int]) -> Resource:

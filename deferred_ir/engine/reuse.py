@@ -19,7 +19,7 @@ from deferred_ir.graph.graph import Step
 class _Run:
     made_of: tuple[Any, ...]
     outputs: list[int]
-    standing: Counter[str]
+    figures: Counter[str]
 
 
 class Runs:
@@ -28,11 +28,11 @@ class Runs:
     def __init__(self) -> None:
         self._runs: dict[str, _Run] = {}
 
-    def standing(self, step: Step, io: Io, frame: Frame) -> Counter[str] | None:
+    def figures(self, step: Step, io: Io, frame: Frame) -> Counter[str] | None:
         """The figures that still hold, if the step would write what its outputs hold already; else None."""
         run = self._runs.get(step.name)
         if run and run.outputs == _versions(io, step.outputs) and run.made_of == _made_of(step, io, frame):
-            return run.standing
+            return run.figures
         return None
 
     def forget(self, step: Step) -> None:
@@ -42,7 +42,7 @@ class Runs:
     def remember(self, step: Step, io: Io, frame: Frame) -> None:
         """Its outputs are written."""
         if not io.again:
-            self._runs[step.name] = _Run(_made_of(step, io, frame), _versions(io, step.outputs), Counter(io.standing))
+            self._runs[step.name] = _Run(_made_of(step, io, frame), _versions(io, step.outputs), Counter(io.figures))
 
     def clear(self) -> None:
         """Every step is to run."""
@@ -64,6 +64,7 @@ def _made_of(step: Step, io: Io, frame: Frame) -> tuple[Any, ...]:
         type(step.work),
         step.work.params,
         tuple(io.defines.items()),
+        tuple(io.metas.items()),
         _versions(io, step.work.inputs),
         named,
         frame.by_view,

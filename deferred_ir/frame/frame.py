@@ -52,7 +52,7 @@ class Frame:
     @property
     def smooth(self) -> bool:
         """Whether shading normals may differ from the faces'."""
-        return self.buffers.defines["HAS_NORMALS"] == 1
+        return self.buffers.has_normals
 
     @property
     def near(self) -> float:

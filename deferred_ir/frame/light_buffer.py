@@ -10,10 +10,10 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.versions import new_versions
-from deferred_ir.gl.textures import GpuBuffer
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Facts
 from deferred_ir.graph.ports import Buffer, Output
+from deferred_ir.scene.geometry import Geometry
 from deferred_ir.scene.lights.spot import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
 from deferred_ir.scene.scene import Scene
 from deferred_ir.vpls.cast import Vpls
@@ -50,10 +50,18 @@ class VplParams:
         return replace(facts, vpls=vpls, clamped=vpls and self.clamp_fraction > 0)
 
 
+@dataclass(frozen=True)
+class LightsMeta:
+    """What is known of a light buffer before it is filled. bounces: most diffuse bounces of a path that makes a VPL."""
+
+    bounces: int
+
+
 def output(vpls: int, bounces: int = 1) -> Output:
     """The port of a buffer with room for the spotlight and `vpls` VPLs."""
     records = Buffer("light", 1 + vpls, LIGHT.itemsize, LIGHTS_PER_BLOCK)
-    return Output("the spotlight, then the VPLs", records, {"LIGHTS_PER_BLOCK": LIGHTS_PER_BLOCK, "BOUNCES": bounces})
+    defines = {"LIGHTS_PER_BLOCK": LIGHTS_PER_BLOCK}
+    return Output("the spotlight, then the VPLs", records, defines, meta=LightsMeta(bounces))
 
 
 def packed(scene: Scene, vpls: Vpls, params: VplParams, tiles: Ints) -> np.ndarray:
@@ -76,19 +84,25 @@ def off_surface(scene: Scene, position: Array, normal: Array) -> Array:
     return lifted
 
 
-def map_versions(lights: GpuBuffer, records: np.ndarray, scene: Scene) -> Ints:
-    """Versions (n,) of LIGHT records (n,) that come next in `lights`: a record keeps its own while its map would.
+class MapVersions:
+    """Versions of the shadow maps that a buffer's lights would have: a light's stays as long as its map would.
 
-    A map shows the same while the models stay and light i looks as it did; how bright it is does not matter.
+    A map shows the same while the models stay and its light keeps pose and shape; how bright that is does not matter.
     """
-    shapes = records.copy()
-    shapes["emission"] = shapes["clamp_squared"] = 0
-    looks = shapes.view(np.uint32).reshape(len(records), -1)
-    geometry, before, versions = lights.kept or (None, looks[:0], np.zeros(0, int))
-    both = min(len(looks), len(before)) if geometry is scene.geometry else 0
-    same: Bools = np.zeros(len(looks), bool)
-    same[:both] = (looks[:both] == before[:both]).all(axis=1)
-    made = new_versions(len(looks))
-    made[same] = versions[:both][same[:both]]
-    lights.kept = scene.geometry, looks, made
-    return made
+
+    def __init__(self) -> None:
+        self._geometry: Geometry | None = None
+        self._shapes, self._versions = np.zeros((0, LIGHT.itemsize // 4), np.uint32), np.zeros(0, int)
+
+    def update(self, records: np.ndarray, scene: Scene) -> Ints:
+        """Return the versions (n,) of the next frame's lights, LIGHT records (n,)."""
+        lights = records.copy()
+        lights["emission"] = lights["clamp_squared"] = 0
+        shapes = lights.view(np.uint32).reshape(len(records), -1)
+        both = min(len(shapes), len(self._shapes)) if self._geometry is scene.geometry else 0
+        same: Bools = np.zeros(len(shapes), bool)
+        same[:both] = (shapes[:both] == self._shapes[:both]).all(axis=1)
+        versions = new_versions(len(shapes))
+        versions[same] = self._versions[:both][same[:both]]
+        self._geometry, self._shapes, self._versions = scene.geometry, shapes, versions
+        return versions

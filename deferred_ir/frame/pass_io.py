@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 from deferred_ir.base.errors import DeviceError, ShaderError
 from deferred_ir.frame.frame import Frame
@@ -13,9 +13,11 @@ from deferred_ir.gl.textures import Framebuffer, GpuBuffer, GpuTexture
 from deferred_ir.graph.graph import Step
 from deferred_ir.graph.params import specs
 from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Output
 
 NO_DEFINES: Mapping[str, int | float] = {}
 Resource = GpuTexture | GpuBuffer | list[GpuTexture]
+Meta = TypeVar("Meta")
 SCENE_SAMPLERS = {"albedo_texture"}
 """Samplers that SceneBuffers binds; all others must be ports."""
 
@@ -23,8 +25,9 @@ SCENE_SAMPLERS = {"albedo_texture"}
 class Io:
     """A pass's ports during `execute`: `io["depth"]` is a resource; `io.program(...)` knows the inputs' defines.
 
-    written: the defines of each (pass, port) of the plan. What a run publishes: counters, of its work; standing, of
-    what its outputs hold; again: whether the next frame must run the pass even if nothing that it is made of changes.
+    written: each (pass, port) of the plan as its writer declares it. state: the pass's `State`, which the pass changes
+    as it likes and finds again in the next frame. What a run publishes: counters, of its work; figures, of what its
+    outputs hold; again: whether the next frame must run the pass even if nothing that it is made of changes.
     """
 
     def __init__(
@@ -32,11 +35,12 @@ class Io:
         library: ShaderLibrary,
         step: Step,
         ports: Mapping[str, Resource | None],
-        written: Mapping[tuple[str, str], Mapping[str, int | float]],
+        written: Mapping[tuple[str, str], Output],
+        state: Any = None,
     ) -> None:
-        self._library, self._step, self._ports = library, step, ports
+        self._library, self.step, self._ports, self.state = library, step, ports, state
         self.counters: Counter[str] = Counter()
-        self.standing: Counter[str] = Counter()
+        self.figures: Counter[str] = Counter()
         self.again = False
         self.gpu = library.gpu
         self._framebuffer: Framebuffer | None = None
@@ -45,10 +49,12 @@ class Io:
         sampled = [name for name in textures if not step.work.inputs[name].attach]
         self._units = {name: i for i, name in enumerate(sampled)}
         self.defines: dict[str, int | float] = {f"UNIT_{name.upper()}": i for name, i in self._units.items()}
+        self.metas: dict[str, Any] = {}
         for name, source in step.sources.items():
             self.defines[f"HAS_{name.upper()}"] = int(source is not None)
             if source:
-                self.defines |= written[source]
+                self.defines |= written[source].defines
+                self.metas[name] = written[source].meta
         for output in step.outputs.values():
             self.defines |= output.defines
         drawn = [name for name, output in step.outputs.items() if output.attach and _colour(ports[name])]
@@ -56,14 +62,21 @@ class Io:
 
     def __getitem__(self, port: str) -> Any:
         if port not in self._ports:
-            raise KeyError(f"{self._step.name} declares no port '{port}'; it has: {', '.join(self._ports)}")
+            raise KeyError(f"{self.step.name} declares no port '{port}'; it has: {', '.join(self._ports)}")
         return self._ports[port]
+
+    def meta(self, port: str, kind: type[Meta]) -> Meta:
+        """Return what the writer of the input `port`, which is connected, says of it: its `Output.meta`, a `kind`."""
+        found = self.metas[port]
+        if not isinstance(found, kind):
+            raise TypeError(f"{self.step.name}.{port}: carries {type(found).__name__}, and {kind.__name__} is wanted")
+        return found
 
     @property
     def framebuffer(self) -> Framebuffer:
         """The pass's textures as a render target, bound when `execute` begins."""
         if self._framebuffer is None:
-            raise ValueError(f"{self._step.name}: has no output to draw into")
+            raise ValueError(f"{self.step.name}: has no output to draw into")
         return self._framebuffer
 
     def attach(self, framebuffer: Framebuffer) -> None:
@@ -73,47 +86,61 @@ class Io:
     def begin(self) -> None:
         """Before a run: bind the framebuffer and all sampled inputs; nothing is published yet."""
         self.counters.clear()
-        self.standing.clear()
+        self.figures.clear()
         self.again = False
         if self._framebuffer:
             self._framebuffer.bind()
         for name, unit in self._units.items():
-            port = self._step.work.inputs[name]
+            port = self.step.work.inputs[name]
             self[name].bind(unit, self.gpu.sampler(port.linear, port.compare))
 
     def program(self, *files: str, defines: Mapping[str, int | float] = NO_DEFINES) -> Program:
         """The program of these shader files, one a stage, with the defines of this pass's ports and `defines`."""
         key = (*files, *defines.items())
         if key not in self._programs:
-            folder = self._step.work.shader_folder
+            folder = self.step.work.shader_folder
             program = self._library.program(*files, defines={**self.defines, **defines}, folder=folder)
-            unknown = program.samplers - SCENE_SAMPLERS - set(self._step.work.inputs)
+            unknown = program.samplers - SCENE_SAMPLERS - set(self.step.work.inputs)
             if unknown:
-                raise ShaderError(f"{program.name}: sampler '{min(unknown)}' is no input of pass {self._step.name}")
+                raise ShaderError(f"{program.name}: sampler '{min(unknown)}' is no input of pass {self.step.name}")
             self._programs[key] = program
         return self._programs[key]
 
     def fit(self, port: str, layers: int) -> None:
-        """Let the texture `port`, one that grows and is drawn into, have room for `layers` layers."""
+        """Give the texture `port`, one that grows and is drawn into, room for `layers` layers.
+
+        If it is allocated anew for that, so is `state`: the old one may describe texels that are gone.
+        """
+        before = self[port].version
         try:
-            anew = self[port].fit(layers)
+            self[port].fit(layers)
         except DeviceError as error:
-            self.framebuffer.attach()
-            raise DeviceError(f"{self._step.name}.{port}: {error}") from error
-        if anew:
-            self.framebuffer.attach()
+            raise DeviceError(f"{self.step.name}.{port}: {error}") from error
+        finally:
+            if self[port].version != before:
+                self.forget()
+                self.framebuffer.attach()
+
+    def forget(self) -> None:
+        """Start over with a new `state`."""
+        self.state = new_state(self.step.work)
 
     def count(self, name: str, value: int) -> None:
         """Publish how much work this run did, such as the number of maps drawn; none where the pass is not run."""
         self.counters[name] += value
 
-    def state(self, name: str, value: int) -> None:
+    def report(self, name: str, value: int) -> None:
         """Publish a figure of what the outputs hold, such as the number of VPLs alive."""
-        self.standing[name] += value
+        self.figures[name] += value
 
     def repeat(self) -> None:
-        """Let the next frame run the pass in any case: what it keeps from frame to frame has not come to rest."""
+        """Let the next frame run the pass in any case: its state has not come to rest."""
         self.again = True
+
+
+def new_state(work: Pass) -> Any:
+    """Return the state that a pass starts with, None if it declares none."""
+    return None if work.State is None else work.State()
 
 
 def _colour(resource: Resource | None) -> bool:

@@ -32,7 +32,8 @@ OWN = "own"
 class SceneBuffers:
     """Indexed triangles with what shaders read of each face.
 
-    defines: say what there is of attributes, materials and textures, so that shaders have nothing for the rest.
+    has_normals: whether there are normals at vertices. defines: tell shaders what there is of attributes,
+    materials and textures, so that they have no code for the rest.
     general: there are normals and texture coordinates in any case, with values that change nothing, and shaders are
     those for any scene.
     """
@@ -49,8 +50,9 @@ class SceneBuffers:
             neutral = {"normal": np.zeros((count, 3)), "uv": np.zeros((count, 2))}
             arrays |= {name: array for name, array in neutral.items() if arrays[name] is None}
         self._ranges = _ranges(scene)
+        self.has_normals = arrays["normal"] is not None
         self.defines = {
-            "HAS_NORMALS": int(arrays["normal"] is not None),
+            "HAS_NORMALS": int(self.has_normals),
             "HAS_UVS": int(arrays["uv"] is not None),
             "HAS_COLORS": int(arrays["color"] is not None),
             "ONE_MATERIAL": int(len(scene.materials) == 1 and not general),

@@ -54,13 +54,9 @@ SCRATCH_UNIT = 31
 class GpuTexture:
     """A 2D texture or array of one level. `size` is (width, height), `layers` how many an array has now, else 0.
 
-    nbytes: what the driver has allocated for its texels.
-
-    kept: what its writer notes about what it holds, for the frames that follow. version: another number whenever
-    something was written into it, unlike that of any other texture or buffer.
+    nbytes: what the driver has allocated for its texels. version: another number whenever something was written into
+    it, unlike that of any other texture or buffer.
     """
-
-    kept: Any = None
 
     def __init__(self, gpu: Gpu, description: Texture, size: tuple[int, int]) -> None:
         self.gpu, self.description, self.size = gpu, description, size
@@ -105,7 +101,6 @@ class GpuTexture:
         """
         if layers <= self.layers <= 2 * layers:
             return False
-        self.kept = None
         self.gpu.gl.delete("DeleteTextures", self.glo)
         try:
             self._allocate(layers)
@@ -233,10 +228,8 @@ class GpuBuffer:
     """A buffer of records that a pass writes from the CPU; `records` is what it wrote last.
 
     versions: a number for each record; as long as it is the same, so is what is drawn for that record. None: unknown.
-    kept: what its writer notes for the frames that follow. version: another number whenever what it holds has changed.
+    version: another number whenever what it holds has changed.
     """
-
-    kept: Any = None
 
     def __init__(self, gpu: Gpu, description: Buffer) -> None:
         self.gpu, self.description = gpu, description

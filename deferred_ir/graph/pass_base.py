@@ -13,7 +13,6 @@ from typing import Any, ClassVar
 from deferred_ir.graph.params import NoParams
 from deferred_ir.graph.ports import Description, Input, Output
 
-NO_PORTS: Mapping[str, Any] = {}
 FRAME_PARTS = frozenset({"camera", "light", "models", "seed", "time"})
 """What a pass can read of a frame; `camera` includes the frame's size."""
 
@@ -54,6 +53,11 @@ class Pass:
 
     Params: ClassVar[type] = NoParams
     inputs: ClassVar[Mapping[str, Input]] = {}
+    State: ClassVar[type | None] = None
+    """What the pass carries from one frame to the next: made without arguments, and `io.state` in `execute`.
+
+    A new one is made when the pass is new, one of its outputs is allocated anew, or all frames so far are forgotten.
+    """
     gives_back: ClassVar[bool] = False
     """It adds the light that VPLs' clamp takes (`bias` in RUN.json)."""
     shader_folder: ClassVar[Path | None] = None
@@ -89,14 +93,12 @@ class Pass:
         """Frames of a still scene until what it keeps from frame to frame is complete: one, unless it says more."""
         return 1
 
-    def subpasses(
-        self, inputs: Mapping[str, Description | None], ports: Mapping[str, Any] = NO_PORTS
-    ) -> Sequence[Mapping[str, Any]]:
+    def subpasses(self, inputs: Mapping[str, Description | None], state: Any = None) -> Sequence[Mapping[str, Any]]:
         """The parts that the pass plans for itself, one dictionary each, for whoever looks at the plan.
 
-        ports: its resources after a frame; then the parts are those of that frame.
+        state: the pass's `State` after a frame; then the parts are those of that frame.
         """
-        del inputs, ports
+        del inputs, state
         return ()
 
     def execute(self, frame: Any, io: Any) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ class Output:
     `spare`: the pass can do without it, and does where nothing reads it; its shader asks for `TARGET_<PORT>`.
     `transient`: a texture that each frame writes whole and the next does not read, so that once its last reader is done
     another output of the same description may use it.
+    `meta`: a frozen dataclass for the readers' code on the CPU (`io.meta`), as `defines` are for their shaders.
     """
 
     doc: str
@@ -85,3 +87,4 @@ class Output:
     attach: bool = True
     spare: bool = False
     transient: bool = False
+    meta: Any = None

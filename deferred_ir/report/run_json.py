@@ -35,7 +35,7 @@ def run_record(
     passes: list[dict[str, Any]] = [dict(entry) for entry in record.passes()]
     for entry in passes:
         step = next((step for step in plan.steps if step.name == entry["name"]), None)
-        if step and (subpasses := step.work.subpasses(step.descriptions, renderer.executor.ports(step))):
+        if step and (subpasses := step.work.subpasses(step.descriptions, renderer.executor.state(step.name))):
             entry["subpasses"] = [dict(subpass) for subpass in subpasses]
     memory = renderer.memory()
     left_out = [*savings.of_scene(scene), *savings.of_frames(renderer, plan, record)]

@@ -1,4 +1,4 @@
-"""Which maps of an atlas are there already: those drawn for lights that say, by their version, that they stay."""
+"""Which shadow maps of an atlas can be used again: those drawn for a light whose version is still the same."""
 
 from __future__ import annotations
 
@@ -15,27 +15,38 @@ from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.shadows.settings import MapParams
 
 
-@dataclass
-class KeptMaps:
-    """What an atlas holds. Place 0 is the spotlight's layer, place 1 + t tile t of the VPLs.
+@dataclass(frozen=True)
+class FrameMaps:
+    """The maps of one frame's lights.
 
-    params: with which it was drawn. places, versions: int (n,), of the lights of the frame; no versions: every map is
-    drawn in every frame. shining: bool (n,), which of them have power, and so need a map. dirty: bool (n,), which must
-    be drawn. held: int (all places,), the version of the light whose map is in each place, 0 for none.
+    places, versions: int (n,); without versions every map is drawn in every frame. shining: bool (n,), which lights
+    have power, and so need a map. dirty: bool (n,), which maps must be drawn.
     """
 
-    params: MapParams
     places: Ints
     versions: Ints | None
     shining: Bools
     dirty: Bools
-    held: Ints
 
-    @classmethod
-    def of(cls, io: Io, params: MapParams, *, all_tiles: bool) -> KeptMaps:
-        """For the frame at hand: clears the places of lights that must be drawn, or the whole atlas.
 
-        all_tiles: there is room for all lights that there may ever be; else, unless maps are kept, for those there are.
+class AtlasCache:
+    """What an atlas holds, from frame to frame. Place 0 is the spotlight's layer, place 1 + t tile t of the VPLs.
+
+    params: with which its maps were drawn. versions: int (all places,), the version of the light whose map is in each
+    place, 0 for none.
+    """
+
+    def __init__(self) -> None:
+        self.params: MapParams | None = None
+        self.versions: Ints = np.zeros(0, np.int64)
+        self.frame: FrameMaps | None = None
+
+    @staticmethod
+    def begin(io: Io, params: MapParams, *, all_tiles: bool) -> FrameMaps:
+        """Clear the places whose maps this frame must draw, or the whole atlas, and return the frame's maps.
+
+        all_tiles: there is room for all lights that there may ever be; otherwise for those of the frame, unless their
+        maps are to be used again.
         """
         atlas, lights = io["atlas"], io["lights"]
         places = lights.records["tile"].astype(int) + 1
@@ -45,43 +56,44 @@ class KeptMaps:
         if versions is None and not all_tiles:
             layers = 1 - (-int(places[lit].max(initial=0)) // per_layer)
         io.fit("atlas", layers)
-        before: KeptMaps | None = atlas.kept
-        if versions is not None and before and before.versions is not None and before.params == params:
-            kept = cls(params, places, versions, lit, lit & (before.held[places] != versions), before.held)
-            kept.clear(atlas)
+        cache: AtlasCache = io.state  # a new one if the atlas did not fit
+        before = cache.frame
+        if versions is not None and before and before.versions is not None and cache.params == params:
+            cache.frame = FrameMaps(places, versions, lit, lit & (cache.versions[places] != versions))
+            cache._clear_dirty(atlas, cache.frame, params)
         else:
             io.framebuffer.clear_depth()
-            held = np.zeros(1 + (atlas.description.layers - 1) * per_layer, np.int64)
-            kept = cls(params, places, versions, lit, lit, held)
-        atlas.kept = kept
-        return kept
+            cache.versions = np.zeros(1 + (atlas.description.layers - 1) * per_layer, np.int64)
+            cache.params, cache.frame = params, FrameMaps(places, versions, lit, lit)
+        return cache.frame
 
-    def clear(self, atlas: GpuTexture) -> None:
-        """Make room for the maps that must be drawn."""
-        edge = self.params.vpl_size
+    def _clear_dirty(self, atlas: GpuTexture, frame: FrameMaps, params: MapParams) -> None:
+        edge = params.vpl_size
         per_row = atlas.size[0] // edge
-        for place in self.places[self.dirty]:
+        for place in frame.places[frame.dirty]:
             if place == 0:
-                atlas.clear_part(0, (0, 0), self.params.spot_size)
+                atlas.clear_part(0, (0, 0), params.spot_size)
             else:
                 layer, tile = divmod(int(place) - 1, per_row**2)
                 atlas.clear_part(1 + layer, (tile % per_row * edge, tile // per_row * edge), edge)
 
     def remember(self) -> None:
-        """They are drawn."""
-        if self.versions is not None:
-            self.held[self.places[self.dirty]] = self.versions[self.dirty]
+        """Note that the frame's maps are drawn."""
+        frame = self.frame
+        if frame and frame.versions is not None:
+            self.versions[frame.places[frame.dirty]] = frame.versions[frame.dirty]
 
-    def told(self, parts: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-        """Of `parts`, one for each place, those of the frame's lights, and whether their maps were drawn in it."""
-        told: list[Mapping[str, Any]] = []
-        for place, lit, dirty in zip(self.places, self.shining, self.dirty, strict=True):
+    def describe(self, parts: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+        """Return those of `parts`, one for each place, that the last frame's lights have, and what became of each."""
+        frame, found = self.frame, list[Mapping[str, Any]]()
+        assert frame
+        for place, lit, dirty in zip(frame.places, frame.shining, frame.dirty, strict=True):
             if not lit:
-                told.append({**parts[place], "state": "left out", "why": "it lights nothing that is seen"})
-            elif self.versions is None:
-                told.append({**parts[place], "why": "every frame redoes everything"})
+                found.append({**parts[place], "state": "left out", "why": "it lights nothing that is seen"})
+            elif frame.versions is None:
+                found.append({**parts[place], "why": "every frame redoes everything"})
             elif dirty:
-                told.append({**parts[place], "state": "dirty", "why": "its light is new, or it or a model has moved"})
+                found.append({**parts[place], "state": "dirty", "why": "its light is new, or it or a model has moved"})
             else:
-                told.append({**parts[place], "state": "kept", "why": "its light stays"})
-        return told
+                found.append({**parts[place], "state": "kept", "why": "its light stays"})
+        return found

@@ -44,5 +44,5 @@ def count(frame: Frame, io: Io, params: MapParams) -> None:
     """Publish how large the mesh is that stands in for the scene, if one does."""
     mesh = of_vpls(frame, params)
     if mesh is not frame.buffers.cluster_buffers:
-        io.state("stand_in_triangles", int(mesh.clusters.sizes.sum()))
-        io.state("stand_in_bytes", mesh.mesh_bytes)
+        io.report("stand_in_triangles", int(mesh.clusters.sizes.sum()))
+        io.report("stand_in_bytes", mesh.mesh_bytes)

@@ -7,12 +7,21 @@ Each pixel of an n x n block is lit by a share of the VPLs. Pixels with the same
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from deferred_ir.base.arrays import Ints
 
 SHUFFLE = 8191
 """Seed of the permutation, the same in every frame."""
+
+
+@dataclass(frozen=True)
+class SharesMeta:
+    """How VPLs are dealt. n: edge of a block of pixels, each of which is lit by one of n^2 shares."""
+
+    n: int
 
 
 def dealt(slots: Ints, capacity: int) -> Ints:

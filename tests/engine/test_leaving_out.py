@@ -81,7 +81,7 @@ def test_the_plan_of_a_frame_says_which_lights_have_no_map(renderer):
     one = renderer(SIZE)
     one.render(gable(), vpls=16)
     step = next(step for step in one.plan(gable(), 16).steps if step.name == "shadow_maps")
-    parts = step.work.subpasses(step.descriptions, one.executor.ports(step))
+    parts = step.work.subpasses(step.descriptions, one.executor.state("shadow_maps"))
     out = [part for part in parts if part["state"] == "left out"]
     assert len(out) == one.executor.counters["lights_dropped"]
     assert out[0]["why"] == "it lights nothing that is seen"

@@ -295,9 +295,9 @@ def test_windows_that_are_kept_with_the_g_buffer_give_the_same_pixels(renderer, 
     settings = {**SETTINGS, "interleave.n": n}
     one, other = (renderer((37, 29), "interleaved", set=settings, reuse=reuse) for reuse in (True, False))
     for step, scene in enumerate([ROOM, LIGHT, ROOM, CAMERA, replace(LIGHT, camera=CAMERA.camera)]):
-        windows = one.executor.resource(("gather", "missing")).kept if step else None
+        windows = one.executor.state("gather").windows if step else None
         np.testing.assert_array_equal(*(made.render(scene, seed=3).radiance for made in (one, other)))
-        assert (one.executor.resource(("gather", "missing")).kept == windows) == (step in (1, 2, 4))
+        assert (one.executor.state("gather").windows == windows) == (step in (1, 2, 4))
     for change in ({"gather.fewest": 0.0}, {"gather.fewest": 0.9}, {"gather.angle": 5.0}):
         for made in (one, other):
             made.configure(set=settings | change)

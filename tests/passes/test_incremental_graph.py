@@ -37,7 +37,7 @@ def test_kept_maps_hold_what_maps_drawn_anew_hold(renderer, projection, layer_fr
         assert one.executor.counters["maps_drawn"] <= 1 + 8
     kept, spot = read_vpl_maps(one), read_atlas(one)[0]
     assert len(kept) > 16
-    one.executor.resource(("shadow_maps", "atlas")).kept = None
+    one.executor.state("shadow_maps").params = None  # so that all maps are drawn anew
     one.draw(moved(ROOM, 8), plan)
     assert one.executor.counters["maps_drawn"] == 1 + len(kept)
     anew = read_vpl_maps(one)

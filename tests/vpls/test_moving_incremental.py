@@ -230,7 +230,7 @@ def test_maps_at_rest_hold_what_maps_drawn_anew_hold(renderer, projection):
     assert one.executor.counters["maps_drawn"] == 0
     kept, spot = read_vpl_maps(one), read_atlas(one)[0]
     assert len(kept) > 16
-    one.executor.resource(("shadow_maps", "atlas")).kept = None
+    one.executor.state("shadow_maps").params = None  # so that all maps are drawn anew
     one.draw(scene, plan, time=12 / 30)
     assert one.executor.counters["maps_drawn"] == 1 + len(kept)
     anew = read_vpl_maps(one)

@@ -46,11 +46,12 @@ class MapsPanel:
 
     def _tiles(self, step: Step) -> list[Map]:
         """From the sub-passes that name layer, tile and size."""
-        ports = {port: self._session.output((step.name, port)) for port in step.outputs}
-        if not all(isinstance(found, GpuTexture) and found.kept for found in ports.values()):
+        state = self._session.renderer.executor.state(step.name)
+        texture = self._session.output((step.name, next(iter(step.outputs), "")))
+        if state is None or not isinstance(texture, GpuTexture):
             return []
-        texture, found = next(iter(ports.values())), []
-        for part in step.work.subpasses(step.descriptions, ports):
+        found = []
+        for part in step.work.subpasses(step.descriptions, state):
             if {"light", "layer", "tile", "size"} <= part.keys():
                 y, x = divmod(part["tile"], texture.size[0] // part["size"])
                 place = Area(x * part["size"], y * part["size"], part["size"], part["size"])

@@ -1,4 +1,4 @@
-"""What several commands do with their options and with what a scene file says."""
+"""What to render with: options of a call or of the command line, over a scene file's [render] table, over defaults."""
 
 from __future__ import annotations
 
@@ -10,13 +10,24 @@ from deferred_ir.graph.params import read_value
 from deferred_ir.loading.scene_file import parse_size
 from deferred_ir.scene.scene import RenderDefaults, Scene
 
+DEFAULT_GRAPH = "deferred"
 DEFAULT_SIZE = (512, 512)
 COUNT = "vpl.count"
 """What --vpls and [render] vpls set."""
 
 
-def chosen_size(text: str | None, defaults: RenderDefaults) -> tuple[int, int]:
-    """(width, height): --size, else the scene file's, else 512x512."""
+def choose_graph(name: str | None, defaults: RenderDefaults) -> str:
+    """Return --graph, else the scene file's graph, else `deferred`."""
+    return name if name is not None else defaults.graph or DEFAULT_GRAPH
+
+
+def choose_seed(seed: int | None, defaults: RenderDefaults) -> int:
+    """Return --seed, else the scene file's seed, else 0."""
+    return seed if seed is not None else defaults.seed or 0
+
+
+def choose_size(text: str | None, defaults: RenderDefaults) -> tuple[int, int]:
+    """Return (width, height) in pixels: --size, else the scene file's size, else 512x512."""
     if text is None:
         return defaults.size or DEFAULT_SIZE
     size = parse_size(text)
@@ -25,19 +36,8 @@ def chosen_size(text: str | None, defaults: RenderDefaults) -> tuple[int, int]:
     return size
 
 
-def parse_settings(pairs: Sequence[str]) -> dict[str, Any]:
-    """{"pass.param": value} of `--set` arguments."""
-    result = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not equals:
-            raise SettingError(f"--set {pair}: wants PASS.PARAM=VALUE")
-        result[key.strip()] = read_value(value.strip())
-    return result
-
-
-def chosen_settings(defaults: RenderDefaults, settings: Mapping[str, Any], vpls: int | None) -> dict[str, Any]:
-    """{"pass.param": value}: the scene file's [render], under --set, under --vpls."""
+def choose_settings(defaults: RenderDefaults, settings: Mapping[str, Any], vpls: int | None) -> dict[str, Any]:
+    """Merge {"pass.param": value}: --vpls over --set over the scene file's [render] table."""
     if vpls is not None and settings.get(COUNT, vpls) != vpls:
         raise SettingError(f"--vpls {vpls} and --set {COUNT}={settings[COUNT]}: contradict each other; give one")
     chosen = dict(defaults.set)
@@ -49,7 +49,18 @@ def chosen_settings(defaults: RenderDefaults, settings: Mapping[str, Any], vpls:
     return chosen
 
 
-def notes(scene: Scene) -> Iterator[str]:
-    """What of the files is not honoured, and what was chosen."""
+def parse_settings(pairs: Sequence[str]) -> dict[str, Any]:
+    """Read {"pass.param": value} from the arguments of `--set`."""
+    result = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals:
+            raise SettingError(f"--set {pair}: wants PASS.PARAM=VALUE")
+        result[key.strip()] = read_value(value.strip())
+    return result
+
+
+def list_notes(scene: Scene) -> Iterator[str]:
+    """Yield what the files say but the renderer ignores, then what was chosen because the files leave it out."""
     yield from scene.notes
     yield from (f"no {what} in the file: {how.get('why', 'one was chosen')}" for what, how in scene.chosen.items())

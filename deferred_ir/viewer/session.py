@@ -18,7 +18,7 @@ from deferred_ir.base.errors import Error, GraphError
 from deferred_ir.engine.accumulation import Accumulation, readers
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import IMAGES, Renderer
-from deferred_ir.engine.settings import chosen_settings
+from deferred_ir.engine.settings import choose_settings
 from deferred_ir.gl.devices import Loader
 from deferred_ir.graph.graph import Plan
 from deferred_ir.loading.load import load
@@ -119,7 +119,7 @@ class Session:
         try:
             scene = load(name)
             self.scene = scene
-            self._configure(scene.render.graph or self.graph, chosen_settings(scene.render, {}, None))
+            self._configure(scene.render.graph or self.graph, choose_settings(scene.render, {}, None))
         except Error as error:
             self.scene, self.error = before, str(error)
             return

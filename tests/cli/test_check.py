@@ -10,7 +10,6 @@ from importlib import import_module
 
 import pytest
 
-from deferred_ir.cli import check
 from deferred_ir.cli.main import main
 from deferred_ir.loading.load import builtin_scenes, load
 
@@ -116,7 +115,7 @@ def test_the_scene_file_has_a_say(capsys, small_scene):
 def test_a_dark_light_is_told(capsys, monkeypatch, tmp_path):
     scene = load("cornell")
     dark = replace(scene, spotlight=replace(scene.spotlight, emission=(0.0, 0.0, 0.0)))
-    monkeypatch.setattr(check, "load", lambda _: dark)
+    monkeypatch.setattr("deferred_ir.loading.load.load", lambda _: dark)
     assert main(["check", "cornell", *ONE, "--json", str(tmp_path / "f.json")]) == 0
     output = capsys.readouterr()
     assert output.err == "note: cornell: the spotlight emits nothing: no light that a map could be wrong about\n"

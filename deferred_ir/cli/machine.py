@@ -1,4 +1,4 @@
-"""What a machine has of what deferred-ir needs, and how to mend what is missing: `deferred-ir doctor` and `devices`."""
+"""What a machine has of what deferred-ir needs, and how to mend what is missing: the checks of `deferred-ir doctor`."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _VENDOR_FOLDERS = ("/etc/glvnd/egl_vendor.d", "/usr/share/glvnd/egl_vendor.d")
 
 @dataclass(frozen=True)
 class Check:
-    """One thing looked at.
+    """The result of one check.
 
     mend: what to do if it is not ok, or a remark. optional: it does not count against the machine.
     """
@@ -50,22 +50,21 @@ class Check:
     optional: bool = False
 
 
-def checks(device: str = "auto") -> list[Check]:
-    """Looks at everything; never raises for what is missing. `device` is opened as `--device` would."""
-    results = [_python(), *_packages(), _rays()]
+def run_checks(device: str = "auto") -> list[Check]:
+    """Check everything, with the device that `--device` would open; never raises for what is missing."""
+    results = [_check_python(), *_check_packages(), _check_rays()]
     if sys.platform == "linux":
-        results += [_library(), _vendors(), _listed()]
-    return [*results, *_context(device), *_extras(), _display(), *_environment()]
+        results += [_check_library(), _check_vendors(), _check_devices()]
+    return [*results, *_check_context(device), *_check_extras(), _check_display(), *_list_variables()]
 
 
-def healthy(results: Sequence[Check]) -> bool:
-    """Whether all that is required is there: exit status 0."""
+def is_healthy(results: Sequence[Check]) -> bool:
+    """Return whether everything required is there."""
     return all(check.ok or check.optional for check in results)
 
 
-def report(results: Sequence[Check] | None = None) -> str:
-    """The checks as a table, each fault followed by its mend, and a last line that says how it stands."""
-    results = checks() if results is None else results
+def format_report(results: Sequence[Check]) -> str:
+    """Lay out the checks as a table, each fault followed by its mend, and a last line with the faults."""
     width = max(len(check.name) for check in results)
     lines = []
     for check in results:
@@ -81,78 +80,43 @@ def report(results: Sequence[Check] | None = None) -> str:
     return "\n".join(lines)
 
 
-def devices_table() -> str:
-    """All devices, with what OpenGL says of each once it is open; `*` marks the first choice of `--device auto`.
-
-    Raises DeviceError if there is no EGL, or no driver, at all.
-    """
-    opened = [_opened(device) for device in devices.list_devices()] if sys.platform == "linux" else [_default()]
-    if not opened:
-        raise DeviceError(devices.NO_DRIVER)
-    usable = [device for device, _, works in opened if works]
-    usable.sort(key=lambda device: device.kind == "software")
-    rows = [("", "DEVICE", "KIND", "CUDA", "FILE", "NAME", "OPENGL")]
-    for device, version, _ in opened:
-        cuda = "" if device.cuda is None else str(device.cuda)
-        mark = "*" if device in usable[:1] else ""
-        rows.append((mark, device.spec, device.kind, cuda, device.drm or "", device.name, version))
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
-
-
-def _opened(device: devices.Device) -> tuple[devices.Device, str, bool]:
-    """The device as its context names it, its OpenGL version or what is wrong, and whether it works."""
-    try:
-        context, loader, opened = devices.open_device(device)
-    except DeviceError as error:
-        return device, str(error).partition(": ")[2] or str(error), False
-    version = context.info["GL_VERSION"]
-    devices.close(context, loader)
-    return opened, version, True
-
-
-def _default() -> tuple[devices.Device, str, bool]:
-    context, loader, device = devices.create_context()
-    version = context.info["GL_VERSION"]
-    devices.close(context, loader)
-    return device, version, True
-
-
-def _python() -> Check:
+def _check_python() -> Check:
     found = f"{platform.python_version()} on {platform.platform(terse=True)} {platform.machine()}"
     return Check(
         "Python", sys.version_info >= (3, 11), found, "" if sys.version_info >= (3, 11) else "use 3.11 or newer"
     )
 
 
-def _requirements() -> Iterator[tuple[str, str, str]]:
-    """Name, least version and marker of each requirement, read from the installed package, which alone states them."""
+def _list_requirements() -> Iterator[tuple[str, str, str]]:
+    """Yield name, least version and marker of each requirement of the installed package."""
     for line in metadata.requires(DISTRIBUTION) or []:
         requirement, _, marker = line.partition(";")
         name, _, least = requirement.partition(">=")
         yield name.strip(), least.strip(), marker.strip()
 
 
-def _packages() -> list[Check]:
-    """The required packages; embreex, which not every machine can have, is for `_rays`."""
+def _check_packages() -> list[Check]:
+    """Check the required packages apart from embreex, which not every machine can have: `_check_rays` does that."""
     try:
-        required = [(name, least) for name, least, marker in _requirements() if not marker]
+        required = [(name, least) for name, least, marker in _list_requirements() if not marker]
     except metadata.PackageNotFoundError:
         return [Check(DISTRIBUTION, False, "not installed", "pip install .")]
-    modules = {_plain(dist): module for module, dists in metadata.packages_distributions().items() for dist in dists}
+    modules = {
+        _normalise(dist): module for module, dists in metadata.packages_distributions().items() for dist in dists
+    }
     return [
         Check(DISTRIBUTION, True, metadata.version(DISTRIBUTION)),
-        *(_package(name, least, modules.get(_plain(name), name)) for name, least in required),
+        *(_check_package(name, least, modules.get(_normalise(name), name)) for name, least in required),
     ]
 
 
-def _package(name: str, least: str, module: str) -> Check:
+def _check_package(name: str, least: str, module: str) -> Check:
     mend = f"pip install '{name}>={least}'"
     try:
         version = metadata.version(name)
     except metadata.PackageNotFoundError:
         return Check(name, False, "not installed", mend)
-    if _numbers(version) < _numbers(least):
+    if _split_version(version) < _split_version(least):
         return Check(name, False, f"{version}, {least} or newer is needed", mend)
     try:
         importlib.import_module(module)
@@ -163,17 +127,17 @@ def _package(name: str, least: str, module: str) -> Check:
     return Check(name, True, version)
 
 
-def _plain(name: str) -> str:
-    """A distribution's name as indexes compare it."""
+def _normalise(name: str) -> str:
+    """Return a distribution's name as package indexes compare it."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def _numbers(version: str) -> list[int]:
+def _split_version(version: str) -> list[int]:
     return [int(number) for number in re.findall(r"\d+", version)]
 
 
-def _rays() -> Check:
-    """Traces one ray."""
+def _check_rays() -> Check:
+    """Trace one ray."""
     try:
         from deferred_ir.rays.embree import traces_a_ray
 
@@ -187,13 +151,13 @@ def _rays() -> Check:
     return Check("embreex", True, f"{metadata.version('embreex')}, traces rays")
 
 
-def _library() -> Check:
+def _check_library() -> Check:
     fault = devices.load_fault(devices.libegl())
     return Check("EGL library", not fault, fault or devices.libegl(), devices.INSTALL if fault else "")
 
 
-def _vendors() -> Check:
-    """The drivers that EGL knows by their files; some systems do without such files."""
+def _check_vendors() -> Check:
+    """Check the files through which EGL finds its drivers; some systems do without them."""
     files = os.environ.get("__EGL_VENDOR_LIBRARY_FILENAMES", "").split(":")
     folders = os.environ.get("__EGL_VENDOR_LIBRARY_DIRS", ":".join(_VENDOR_FOLDERS)).split(":")
     paths = [Path(file) for file in files if file] or [path for f in folders for path in sorted(Path(f).glob("*.json"))]
@@ -213,7 +177,7 @@ def _vendors() -> Check:
     return Check("EGL drivers", ok, "; ".join(found + broken) or "none", "" if ok else devices.INSTALL, optional=True)
 
 
-def _listed() -> Check:
+def _check_devices() -> Check:
     try:
         found = devices.list_devices()
     except DeviceError as error:
@@ -221,14 +185,14 @@ def _listed() -> Check:
         return Check("devices", False, what, mend)
     mend = ""
     if not any(device.kind == "hardware" for device in found):
-        mend = _hidden_hardware()
+        mend = _explain_missing_hardware()
     return Check(
         "devices", bool(found), ", ".join(map(str, found)) or "none", mend or ("" if found else devices.INSTALL)
     )
 
 
-def _hidden_hardware() -> str:
-    """Why a graphics card that is there may be missing from EGL's list."""
+def _explain_missing_hardware() -> str:
+    """Return why EGL may not list a graphics card that is there, "" if nothing is known."""
     if Path("/dev/nvidiactl").exists():
         return "an NVIDIA GPU is there but not its OpenGL: in a container set NVIDIA_DRIVER_CAPABILITIES=all"
     closed = [node for node in Path("/dev/dri").glob("renderD*") if not os.access(node, os.R_OK | os.W_OK)]
@@ -237,7 +201,7 @@ def _hidden_hardware() -> str:
     return ""
 
 
-def _context(device: str) -> list[Check]:
+def _check_context(device: str) -> list[Check]:
     name = f"context ({device})"
     try:
         context, loader, opened = devices.create_context(device)
@@ -259,10 +223,10 @@ def _context(device: str) -> list[Check]:
     ]
 
 
-def _extras() -> list[Check]:
-    """The packages of the extras, apart from those for work on deferred-ir itself."""
+def _check_extras() -> list[Check]:
+    """Look for the packages of the extras, apart from those for work on deferred-ir itself."""
     try:
-        requirements = list(_requirements())
+        requirements = list(_list_requirements())
     except metadata.PackageNotFoundError:
         return []
     results = []
@@ -278,8 +242,8 @@ def _extras() -> list[Check]:
     return results
 
 
-def _display() -> Check:
-    """Whether a window could open, for the viewer; everything else works without."""
+def _check_display() -> Check:
+    """Try to reach a display, which only the viewer needs."""
     name = "display"
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         return Check(name, False, "none; only the viewer needs one", "set DISPLAY, or use xvfb-run", optional=True)
@@ -294,8 +258,8 @@ def _display() -> Check:
     return Check(name, True, f"GLFW {metadata.version('glfw')}", optional=True)
 
 
-def _environment() -> list[Check]:
-    """Environment variables that change what the above finds."""
+def _list_variables() -> list[Check]:
+    """List the environment variables that change what the checks find."""
     return [
         Check(variable, True, os.environ[variable], meaning, optional=True)
         for variable, meaning in VARIABLES.items()

@@ -1,0 +1,1 @@
+"""The commands of `deferred-ir`: a file a command, found by its name."""

@@ -1,0 +1,146 @@
+"""`deferred-ir compare`: how far an image is from its reference."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from deferred_ir.base.errors import OutputError, SettingError, shown
+from deferred_ir.cli.options import print_notes
+
+if TYPE_CHECKING:
+    from deferred_ir.base.arrays import Array
+    from deferred_ir.truth.metrics import Comparison
+
+HELP = "Measure how far an image is from its reference: relMSE, RMSE, bias, FLIP."
+ORDER = 30
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `deferred-ir compare`."""
+    parser.add_argument("image", metavar="A", help="linear image: .npy or .exr")
+    parser.add_argument("reference", metavar="B", help="the reference, likewise; its record is B.json, if there is one")
+    parser.add_argument("--json", metavar="F", help="write all figures")
+    diff = "write where the image is too dark (blue) or too bright (red)"
+    parser.add_argument("--diff", metavar="OUT.png", help=diff)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print how far an image is from its reference; write the figures and a picture of the error if asked for."""
+    from deferred_ir.base.files import write_json
+    from deferred_ir.truth import error_picture
+    from deferred_ir.truth.metrics import compare
+
+    image_path, reference_path = Path(arguments.image), Path(arguments.reference)
+    json = Path(arguments.json) if arguments.json else None
+    diff = Path(arguments.diff) if arguments.diff else None
+    _check_outputs(image_path, reference_path, json, diff)
+    image, reference = _read(image_path), _read(reference_path)
+    _check_same_scene(image, reference)
+    _check_same_time(image, reference)
+    hit = reference.record.get("hit_fraction") or None
+    result = compare(image.radiance, reference.radiance, hit, names=(str(image_path), str(reference_path)))
+    print_notes(_list_notes(result, image, reference))
+    if diff:
+        error = error_picture.signed_error(image.radiance, reference.radiance, result.reference_mean)
+        error_picture.save(diff, error)
+    if json:
+        names = {"image": str(image_path), "reference": str(reference_path)}
+        write_json(json, {**names, "scene_hash": reference.record.get("scene_hash"), **result.as_dict()})
+    print(format_table(result))
+    return 0
+
+
+@dataclass(frozen=True)
+class _Input:
+    """An image that is compared, and the record beside it, empty if there is none."""
+
+    path: Path
+    radiance: Array
+    record: dict[str, Any]
+
+
+def _read(path: Path) -> _Input:
+    from deferred_ir.output.read import read_radiance, read_record
+
+    radiance = read_radiance(path)
+    return _Input(path, radiance, read_record(path, (radiance.shape[1], radiance.shape[0])))
+
+
+def format_table(result: Comparison) -> str:
+    """Lay out the figures in lines of name, value and what they rest on."""
+    left_out = f"without the worst {result.trimmed_pixels} of {result.pixels} pixels"
+    rows = [
+        ("relMSE (trimmed)", f"{result.relmse:.4g}", left_out),
+        ("relMSE (whole)", f"{result.relmse_untrimmed:.4g}", ""),
+        ("RMSE", f"{result.rmse:.4g}", f"the reference's mean is {result.reference_mean:.4g}"),
+        ("bias", f"{100 * result.bias:+.3f} %", "mean(I - R) / mean(R)"),
+    ]
+    if result.flip is None or result.flip_parameters is None:
+        rows.append(("FLIP", "-", str(result.flip_note)))
+    else:
+        used = result.flip_parameters
+        exposures = f"{used.exposures} exposures, {used.start_exposure:+.2f} to {used.stop_exposure:+.2f} stops"
+        rows.append(("FLIP", f"{result.flip:.4g}", exposures))
+    width = max(len(value) for _, value, _ in rows)
+    return "\n".join(f"{name:<16}  {value:>{width}}  {remark}".rstrip() for name, value, remark in rows)
+
+
+def _check_outputs(image: Path, reference: Path, json: Path | None, diff: Path | None) -> None:
+    """Raise OutputError, before the work, if an output cannot be written or would replace an input."""
+    from deferred_ir.base.files import check_folder
+    from deferred_ir.output.read import record_path
+
+    if diff and diff.suffix.lower() != ".png":
+        raise OutputError(f"{diff}: the difference is a picture; name a .png")
+    inputs = {os.path.realpath(file) for path in (image, reference) for file in (path, record_path(path))}
+    for output in (json, diff):
+        if output is None:
+            continue
+        check_folder(output)
+        if os.path.realpath(output) in inputs:
+            raise OutputError(f"{output}: is an image that is compared, or its record; choose another name")
+
+
+def _check_same_scene(image: _Input, reference: _Input) -> None:
+    """Raise SettingError if the records say that the images show different scenes."""
+    records = image.record, reference.record
+    if all(records) and records[0]["scene_hash"] != records[1]["scene_hash"]:
+        names = [f"{shown(record.get('scene'))} ({shown(record['scene_hash'])})" for record in records]
+        raise SettingError(
+            f"{image.path}: shows the scene {names[0]}, but {reference.path} shows {names[1]}; compare like with like"
+        )
+
+
+def _check_same_time(image: _Input, reference: _Input) -> None:
+    """Raise SettingError if the records give different times of a scene that moves.
+
+    Records of still scenes say 0; those of other programs may leave the time out, and are not checked.
+    """
+    now, then = image.record.get("time"), reference.record.get("time")
+    if isinstance(now, int | float) and isinstance(then, int | float) and abs(now - then) > 1e-3:
+        raise SettingError(
+            f"{image.path}: shows the scene at {now:.4f} s, but {reference.path} shows it at {then:.4f} s; trace a "
+            f"reference of that time: deferred-ir reference --time {now:.4f}"
+        )
+
+
+def _list_notes(result: Comparison, image: _Input, reference: _Input) -> Iterator[str]:
+    """Yield what was not checked, and what the figures take for background."""
+    from deferred_ir.output.read import record_path
+
+    missing = [one.path for one in (reference, image) if not one.record]
+    if missing:
+        name = record_path(missing[0]).name
+        yield f"{missing[0]}: no record {name} beside it, so whether both show the same scene is not checked"
+    size = result.size[0] * result.size[1]
+    if result.pixels_by == "lit" and result.pixels < size:
+        yield f"{size - result.pixels} pixels, black in both images, are taken for background"
+    elif result.pixels_by == "hit fraction":
+        extra = result.pixels - round(reference.record["hit_fraction"] * size)
+        if extra > 0:
+            yield f"{image.path}: is lit in {extra} pixels more than the reference's camera rays hit"

@@ -1,0 +1,22 @@
+"""`deferred-ir doctor`: what this machine has of what deferred-ir needs (cli/machine.py looks at it)."""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "Check this machine, and say how to mend what is missing."
+ORDER = 90
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `deferred-ir doctor`."""
+    parser.add_argument("--device", default="auto", metavar="D", help="the device to check (default: auto)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print all checks. Returns 1 if something that is required is missing."""
+    from deferred_ir.cli import machine
+
+    results = machine.run_checks(arguments.device)
+    print(machine.format_report(results))
+    return 0 if machine.is_healthy(results) else 1

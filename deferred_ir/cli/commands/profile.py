@@ -1,0 +1,118 @@
+"""`deferred-ir profile`: error against run time of a sweep, or of the merged shards of one."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from deferred_ir.base.errors import OutputError, SettingError
+from deferred_ir.cli.options import (
+    SCENE,
+    add_device,
+    add_size,
+    parse_count,
+    parse_counts,
+    parse_seconds,
+    print_notes,
+    split_list,
+)
+
+if TYPE_CHECKING:
+    from deferred_ir.profiling.peers.points import Peers
+    from deferred_ir.profiling.sweep.points import Point
+
+HELP = "Measure error against run time: graphs x numbers of VPLs x seeds."
+ORDER = 40
+VPLS = "16,64,256"
+SEEDS = 3
+LAST = 1.0
+"""Seconds: the time of the last frame, and of the reference, where something moves."""
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `deferred-ir profile`; most are None unless given, since --merge takes none of them."""
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE)
+    parser.add_argument("--merge", nargs="+", metavar="DIR", help="instead: join the points of these folders")
+    parser.add_argument("-o", "--output", required=True, metavar="DIR", help="folder for points, tables and report")
+    parser.add_argument("--graphs", metavar="A,B", help="names or files (default: all built-in graphs)")
+    parser.add_argument("--vpls", metavar="N,N", help=f"numbers of virtual point lights (default: {VPLS})")
+    parser.add_argument("--seeds", type=parse_count, metavar="K", help=f"seeds 0 to K-1 (default: {SEEDS})")
+    add_size(parser)
+    parser.add_argument("--reference", metavar="R.npy", help="with R.json beside it (default: one is traced)")
+    time = "where something moves: the frames end at T seconds, where the reference is (default: 1)"
+    parser.add_argument("--time", type=parse_seconds, metavar="T", help=time)
+    parser.add_argument("--shard", metavar="I/N", help="measure the I-th of N parts only")
+    peers = "other renderers to compare: mitsuba, cycles (default: all that are installed)"
+    parser.add_argument("--peers", metavar="A,B|none", help=peers)
+    add_device(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure a sweep or merge its shards, and write the report."""
+    from deferred_ir.profiling.report import report
+
+    report.check_libraries()
+    folder = Path(arguments.output)
+    points, peers = _merge(arguments, folder) if arguments.merge else _measure(arguments, folder)
+    print(report.write_all(folder, points, peers))
+    print(folder / "report.html", file=sys.stderr)
+    return 0
+
+
+def _measure(arguments: argparse.Namespace, folder: Path) -> tuple[list[Point], Peers]:
+    """Run the sweep. Returns its points, and those of the peers."""
+    if arguments.scene is None:
+        raise SettingError("profile: wants a SCENE to measure, or --merge DIR...")
+    from deferred_ir.engine.settings import choose_size, list_notes
+    from deferred_ir.graph.file import graph_names
+    from deferred_ir.loading.load import load
+    from deferred_ir.profiling.peers import ladder
+    from deferred_ir.profiling.sweep import sweep
+
+    counts = _parse_vpls(VPLS if arguments.vpls is None else arguments.vpls)
+    shard = _parse_shard(arguments.shard)
+    peers = ladder.chosen(arguments.peers)
+    graphs = graph_names() if arguments.graphs is None else split_list(arguments.graphs)
+    scene = load(arguments.scene)
+    size = choose_size(arguments.size, scene.render)
+    seeds = SEEDS if arguments.seeds is None else arguments.seeds
+    time = LAST if arguments.time is None else arguments.time
+    what = sweep.Sweep(scene, size, graphs, counts, seeds, arguments.device, shard, peers, time if scene.moves else 0.0)
+    print_notes(list_notes(scene))
+    return sweep.run(what, folder, Path(arguments.reference) if arguments.reference else None)
+
+
+def _merge(arguments: argparse.Namespace, folder: Path) -> tuple[list[Point], Peers]:
+    """Join the points of the shards that --merge names."""
+    without = ("graphs", "vpls", "seeds", "size", "reference", "shard", "peers", "time", "scene")
+    extra = [name for name in without if getattr(arguments, name) is not None]
+    if extra:
+        what = "a SCENE" if extra[0] == "scene" else f"--{extra[0]}"
+        raise SettingError(f"--merge: takes folders only, not {what}; leave it out")
+    for name in arguments.merge:
+        if not Path(name).is_dir():
+            raise OutputError(f"{name}: is no folder; --merge joins folders that profile wrote")
+    from deferred_ir.profiling.sweep import shards
+
+    points, peers, broken = shards.merge([Path(name) for name in arguments.merge], folder)
+    if broken:
+        print_notes([f"{broken} points were unusable and left out; run their shard again"])
+    return points, peers
+
+
+def _parse_vpls(text: str) -> list[int]:
+    """Read --vpls; none at all is a fault that the sweep reports."""
+    return parse_counts("--vpls", text, VPLS) if text.strip(", ") else []
+
+
+def _parse_shard(text: str | None) -> tuple[int, int]:
+    """Read (i, n) from `--shard i/n`; without it the sweep is one part."""
+    if text is None:
+        return 1, 1
+    match = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
+    if not match or not 1 <= int(match[1]) <= int(match[2]):
+        raise SettingError(f"--shard {text}: wants i/n with i from 1 to n, such as 1/4")
+    return int(match[1]), int(match[2])

@@ -1,0 +1,153 @@
+"""`deferred-ir render`: frames of a scene, images of them, and a record of the run."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from deferred_ir.cli.options import (
+    SCENE,
+    add_device,
+    add_graph,
+    add_seed,
+    add_set,
+    add_size,
+    add_vpls,
+    parse_positive,
+    print_notes,
+)
+
+if TYPE_CHECKING:
+    from deferred_ir.cli.drawing import Drawing
+    from deferred_ir.cli.image_files import ImageFiles
+    from deferred_ir.engine.renderer import Renderer
+    from deferred_ir.scene.scene import Scene
+
+HELP = "Render a scene to images."
+ORDER = 10
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of `deferred-ir render`."""
+    parser.add_argument("scene", metavar="SCENE", help=SCENE)
+    output = "image: .png, .exr or .npy (%%04d: the frame); may be repeated"
+    parser.add_argument("-o", "--output", action="append", default=[], metavar="OUT", help=output)
+    add_graph(parser)
+    add_size(parser)
+    add_vpls(parser)
+    add_seed(parser)
+    add_device(parser)
+    parser.add_argument("--frames", type=parse_positive, default=1, metavar="N", help="frame i shows time i/30 s")
+    accumulate = "average K frames of fresh samples in each image; Ctrl-C keeps what is done"
+    parser.add_argument("--accumulate", type=parse_positive, default=1, metavar="K", help=accumulate)
+    parser.add_argument("--reuse", action="store_true", help="skip a pass while its inputs are unchanged")
+    keep_all = "disable scene-specific optimisations; the pixels are the same, for testing"
+    parser.add_argument("--keep-all", action="store_true", help=keep_all)
+    add_set(parser)
+    parser.add_argument("--json", metavar="RUN.json", help="write what was rendered, and how long it took")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Draw all frames and write what is asked for; after Ctrl-C, what is done by then."""
+    from deferred_ir.base.files import write_json
+    from deferred_ir.cli.image_files import ImageFiles
+    from deferred_ir.engine.settings import list_notes, parse_settings
+    from deferred_ir.loading.load import load
+
+    settings = parse_settings(arguments.set)
+    json = Path(arguments.json) if arguments.json is not None else None
+    files = ImageFiles(arguments.output, arguments.frames, json)
+    scene = load(arguments.scene)
+    if not arguments.output and not json:
+        files = ImageFiles([f"{scene.name}.png"], arguments.frames)
+    print_notes([*list_notes(scene), *files.list_notes()])
+    with _open_renderer(arguments, scene, settings) as renderer:
+        print(f"OpenGL on {renderer.gpu.device}", file=sys.stderr)
+        drawing = _prepare_drawing(renderer, scene, files, arguments)
+        try:
+            for picture in drawing.draw():
+                files.save(picture, drawing.read)
+        except KeyboardInterrupt:
+            if not files.saved:
+                raise
+            print(f"deferred-ir: interrupted: wrote {files.saved} of {arguments.frames} frames", file=sys.stderr)
+            return 130
+        print_notes(_explain_unfilled(drawing))
+        if json:
+            write_json(json, _describe_run(drawing, arguments, picture.averaged))
+    if files.black:
+        print_notes(["the picture is black: the camera sees nothing that is lit"])
+    if files.names:
+        print(f"wrote {files.describe(picture.number + 1)}", file=sys.stderr)
+    if picture.interrupted:
+        counts = f"{picture.averaged} of {arguments.accumulate}"
+        print(f"deferred-ir: interrupted: averaged {counts} frames", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _open_renderer(arguments: argparse.Namespace, scene: Scene, settings: Mapping[str, Any]) -> Renderer:
+    """Open a renderer with the options, over what the scene file asks for."""
+    from deferred_ir.engine.renderer import Renderer
+    from deferred_ir.engine.settings import choose_graph, choose_settings, choose_size
+
+    return Renderer(
+        choose_size(arguments.size, scene.render),
+        choose_graph(arguments.graph, scene.render),
+        arguments.device,
+        set=choose_settings(scene.render, settings, arguments.vpls),
+        reuse=arguments.reuse,
+        keep_all=arguments.keep_all,
+    )
+
+
+def _prepare_drawing(renderer: Renderer, scene: Scene, files: ImageFiles, arguments: argparse.Namespace) -> Drawing:
+    """Plan what the files need. With --json a first frame compiles and allocates: that is not what frames cost."""
+    from deferred_ir.cli.drawing import Drawing
+    from deferred_ir.engine.record import Record
+    from deferred_ir.engine.settings import choose_seed
+
+    outputs = files.choose_outputs(renderer.graph().outputs, averaged=arguments.accumulate > 1)
+    plan = renderer.plan(scene, outputs=None if arguments.keep_all else outputs)
+    seed = choose_seed(arguments.seed, scene.render)
+    record = Record() if arguments.json is not None else None
+    if record:
+        renderer.draw(scene, plan, seed=seed)
+        renderer.reset()
+    return Drawing(renderer, scene, plan, seed, arguments.frames, arguments.accumulate, record)
+
+
+def _describe_run(drawing: Drawing, arguments: argparse.Namespace, averaged: int) -> dict[str, Any]:
+    """Collect what RUN.json holds; `averaged`: frames in the last image."""
+    from deferred_ir.engine.settings import choose_graph
+    from deferred_ir.report.run_json import run_record
+
+    renderer, scene, record = drawing.renderer, drawing.scene, drawing.record
+    assert record is not None
+    renderer.finish(record)
+    graph = choose_graph(arguments.graph, scene.render)
+    return run_record(
+        renderer, scene, graph, renderer.graph(), drawing.plan, seed=drawing.seed, record=record, accumulated=averaged
+    )
+
+
+def _explain_unfilled(drawing: Drawing) -> Iterator[str]:
+    """Yield a note where a pass that renews VPLs over several frames had no budget for all of them."""
+    nodes = drawing.renderer.graph().nodes
+    count = getattr(nodes["vpl"].work.params, "count", 0) if "vpl" in nodes else 0
+    if drawing.accumulate > 1:
+        if drawing.plan.frames_to_fill > 1:
+            yield (
+                f"each of the {drawing.accumulate} frames that are averaged starts afresh, with few of {count} VPLs; "
+                f"--set vpl.most={count} gives them all"
+            )
+        return
+    waiting = drawing.renderer.executor.counters.get("vpls_waiting")
+    if waiting:
+        yield (
+            f"{count - waiting} of {count} rays for VPLs so far: {drawing.plan.frames_to_fill} frames fill "
+            f"the set where nothing moves, or --set vpl.most={count}"
+        )

@@ -24,7 +24,7 @@ from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
-from deferred_ir.vpls.shares import SharesMeta, share_starts
+from deferred_ir.vpls.interleaving import SharesMeta, share_starts
 
 IRRADIANCE, THIN, COUNT, MISSING = range(4)
 """Image units that the shaders declare."""

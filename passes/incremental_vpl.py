@@ -19,7 +19,7 @@ from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Description, Output
 from deferred_ir.vpls.cast import NONE
-from deferred_ir.vpls.keep import IncrementalVpls
+from deferred_ir.vpls.incremental import IncrementalVpls
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output
-from deferred_ir.vpls.shares import SharesMeta, dealt, share_starts
+from deferred_ir.vpls.interleaving import SharesMeta, dealt, share_starts
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
-from deferred_ir.vpls.shares import SharesMeta, share_starts, sub_buffers
+from deferred_ir.vpls.interleaving import SharesMeta, share_starts, sub_buffers
 
 
 class Interleaved(Pass):

@@ -18,7 +18,7 @@ from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.vpls.clamp_residual import VplLimits, residual
-from deferred_ir.vpls.shares import SharesMeta
+from deferred_ir.vpls.interleaving import SharesMeta
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,8 @@ from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.rays.direct import on_pixels
+from deferred_ir.vpls.interleaving import places, share_starts
 from deferred_ir.vpls.ray_masks import BITS, cost_of_maps, cost_of_rays, masks
-from deferred_ir.vpls.shares import places, share_starts
 
 
 @dataclass(frozen=True)

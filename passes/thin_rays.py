@@ -21,8 +21,8 @@ from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.vpls.cast import Vpls
-from deferred_ir.vpls.shares import share_starts
-from deferred_ir.vpls.sum import Lights, Patch
+from deferred_ir.vpls.interleaving import share_starts
+from deferred_ir.vpls.ray_sum import Lights, Patch
 
 
 class ThinRays(Pass):

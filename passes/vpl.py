@@ -17,7 +17,7 @@ from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Description, Output
 from deferred_ir.sampling.patterns import Pattern, warn_unbalanced
 from deferred_ir.vpls.cast import NONE, Vpls, cast
-from deferred_ir.vpls.choose import effects, probes, resample
+from deferred_ir.vpls.resampling import effects, probes, resample
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from deferred_ir.graph.file import load_graph
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import sum
+from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import NONE, cast
 
 DEFAULT_SPP = 64
@@ -186,7 +186,7 @@ def _by_vpls(
     direct = paths.direct(size, DISC_SAMPLES, seed, threads)
     shines = bounces > 0 and any(scene.spotlight.emission)
     lights = cast(scene.spotlight, tracer, params.count, params.pattern, seed, bounces=bounces) if shines else NONE
-    indirect = sum.indirect(
+    indirect = ray_sum.indirect(
         tracer, seen, lights, fov=params.fov, clamp=params.clamp_fraction, threads=threads, progress=progress
     ).reshape(direct.shape)
     return Reference(

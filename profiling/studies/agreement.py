@@ -19,7 +19,7 @@ from deferred_ir.profiling.measure import arguments
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import sum
+from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import cast
 
 BLOCK = 8
@@ -43,7 +43,7 @@ def measure(scene: Scene, size: tuple[int, int], clamp: float, fov: float) -> di
     sums = []
     for seed in track(range(SCRAMBLES), scene.name):
         vpls = cast(scene.spotlight, tracer, COUNT, "sobol", seed)
-        sums.append(blocks(sum.indirect(tracer, seen, vpls, fov=fov, clamp=clamp).reshape(traced.indirect.shape)))
+        sums.append(blocks(ray_sum.indirect(tracer, seen, vpls, fov=fov, clamp=clamp).reshape(traced.indirect.shape)))
     ours, paths = np.array(sums), blocks(traced.indirect)
     variance = ours.var(axis=0, ddof=1) / SCRAMBLES + blocks(traced.variance) / BLOCK**2
     lit = (paths > 0).all(axis=-1)

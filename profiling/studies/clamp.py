@@ -19,7 +19,7 @@ from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import sum
+from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import cast
 
 SIZE = (96, 96)
@@ -41,7 +41,7 @@ def measure(scene: Scene, fov: float) -> dict[str, list[float]]:
             for seed in range(SEEDS):
                 vpls = cast(scene.spotlight, tracer, count, "sobol", seed)
                 for i, clamp in enumerate(CLAMPS):
-                    indirect = sum.indirect(tracer, seen, vpls, fov=fov, clamp=clamp)
+                    indirect = ray_sum.indirect(tracer, seen, vpls, fov=fov, clamp=clamp)
                     image = truth.direct + indirect.reshape(reference.shape)
                     errors[str(count)][i] += relmse(image, reference, truth.hit)[0] / SEEDS
                     bar.advance()

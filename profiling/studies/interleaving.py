@@ -23,7 +23,7 @@ from deferred_ir.loading.load import load
 from deferred_ir.profiling.measure import arguments, panels
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
-from deferred_ir.vpls.shares import sub_buffers
+from deferred_ir.vpls.interleaving import sub_buffers
 
 SIZE = 512, 512
 VPLS = 64, 256, 1024

@@ -13,9 +13,9 @@ from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import load_graph
 from deferred_ir.graph.pass_base import Facts
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import sum
+from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import Vpls, cast
-from deferred_ir.vpls.shares import dealt, places, share_starts, sub_buffers
+from deferred_ir.vpls.interleaving import dealt, places, share_starts, sub_buffers
 
 SIZE = (50, 38)  # no multiple of 4
 RAYS = {"shadow_rays.visibility": "rays", "vpl.clamp": 0.02, "vpl.candidates": 1}
@@ -37,7 +37,7 @@ def read(one, source):
 def irradiance(tracer, hits, vpls, clamp=0.02):
     """Of all VPLs by the reference, (n, 3)."""
     white = replace(hits, albedo=np.full(hits.albedo.shape, np.pi))
-    return sum.indirect(tracer, white, vpls, fov=179.9, clamp=clamp)
+    return ray_sum.indirect(tracer, white, vpls, fov=179.9, clamp=clamp)
 
 
 @pytest.mark.parametrize(("n", "count"), [(4, 45), (2, 500)])

@@ -208,7 +208,7 @@ def test_errors_of_a_known_image():
 @pytest.mark.parametrize("kind", [{"spp": 8, "bounces": 2}, {"vpls": 100, "bounces": 2}])
 def test_the_same_image_for_any_number_of_threads(kind, monkeypatch):
     monkeypatch.setattr("deferred_ir.truth.path_tracer.RAYS", 512)
-    monkeypatch.setattr("deferred_ir.vpls.sum.PIXELS", 100)
+    monkeypatch.setattr("deferred_ir.vpls.ray_sum.PIXELS", 100)
     scene = replace(room(), spotlight=replace(room().spotlight, radius=0.1))
     images = [reference(scene, (24, 16), threads=threads, **kind).radiance for threads in (1, 2, 5)]
     np.testing.assert_array_equal(images[0], images[1])

@@ -16,7 +16,7 @@ from deferred_ir.rays.pixel_surfaces import from_gbuffer
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import NEAR
-from deferred_ir.vpls.shares import dealt, share_starts, sub_buffers
+from deferred_ir.vpls.interleaving import dealt, share_starts, sub_buffers
 
 ANGLE = np.radians(25)
 ABOVE = Camera((0.0, 3.0, 0.001), (0.0, 0.0, 0.0), fov=30.0)

@@ -16,7 +16,7 @@ from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.geometry import carried
 from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
 from deferred_ir.scene.motion import ModelMotion
-from deferred_ir.vpls.keep import FARTHEST, IncrementalVpls
+from deferred_ir.vpls.incremental import FARTHEST, IncrementalVpls
 from deferred_ir.vpls.stale_maps import StaleMaps
 
 SIZE = (48, 32)

@@ -10,7 +10,7 @@ from small_scenes import crooked_room, room, scaled, smooth_scene
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import sum
+from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import cast
 from deferred_ir.vpls.ray_masks import masks
 
@@ -45,7 +45,7 @@ def test_the_light_of_seen_vpls_is_that_of_the_reference(scene, fov):
     """Weights of the reference's own, with the masks instead of its rays: not a pair may differ."""
     tracer, seen, hits, vpls, records = lit_scene(scene, fov=fov)
     words, _ = masks(tracer, seen, records, everything(seen, vpls))
-    expected = sum.indirect(tracer, hits, vpls, fov=fov, clamp=0.02)
+    expected = ray_sum.indirect(tracer, hits, vpls, fov=fov, clamp=0.02)
     way = hits.position[None] - vpls.position[:, None]
     square = (way**2).sum(axis=-1)
     leaving = np.maximum((way * vpls.normal[:, None]).sum(axis=-1), 0)

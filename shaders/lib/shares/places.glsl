@@ -1,4 +1,4 @@
-// Where the pixels of a frame stand in the sub-buffers of interleaved sampling (deferred_ir/vpls/shares.py). INTERLEAVE
+// Where the pixels of a frame stand in the sub-buffers of interleaved sampling (deferred_ir/vpls/interleaving.py). INTERLEAVE
 // is the edge of a block, a power of two.
 
 // Where the part begins that holds the pixels with x mod INTERLEAVE = `share`.

@@ -14,7 +14,7 @@ from small_scenes import box, build, plane, room
 
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
-from deferred_ir.vpls.keep import IncrementalVpls
+from deferred_ir.vpls.incremental import IncrementalVpls
 
 ALBEDO = (0.5, 0.25, 0.125)
 LIGHT = Spotlight((0.1, 0.2, -0.1), (0.3, -1.0, 0.4), 100.0, (3.0, 2.0, 1.0))

@@ -28,7 +28,7 @@ from deferred_ir.sampling.hilbert import hilbert_order
 from deferred_ir.sampling.patterns import systematic, unit_square
 from deferred_ir.scene.camera import Camera
 from deferred_ir.vpls.cast import LUMINANCE, Vpls
-from deferred_ir.vpls.sum import Lights, Patch
+from deferred_ir.vpls.ray_sum import Lights, Patch
 
 PROBES = 128
 """Pixels at which effects are estimated."""

@@ -13,9 +13,9 @@ from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.motion import CameraMotion
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import sum
+from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import NONE, Vpls, cast
-from deferred_ir.vpls.choose import EVEN, PROBES, effects, probes, resample
+from deferred_ir.vpls.resampling import EVEN, PROBES, effects, probes, resample
 
 SHAPE = {"fov": 179.9, "clamp": 0.02}
 SIZE = (64, 48)
@@ -36,7 +36,7 @@ def chosen(scene, count, seed, bounces=1, factor=16):
 def indirect(scene, vpls, size=(16, 12)):
     tracer = Tracer(scene)
     seen = PathTracer(scene, tracer).seen(size)
-    return sum.indirect(tracer, seen, vpls, **SHAPE).reshape(size[1], size[0], 3)
+    return ray_sum.indirect(tracer, seen, vpls, **SHAPE).reshape(size[1], size[0], 3)
 
 
 def made_up(count, seed=0):
@@ -131,7 +131,7 @@ def test_effects_are_what_a_pixel_gets_over_what_all_give_it():
     grey = replace(vpls, emission=np.repeat(vpls.emission @ [[0.2126], [0.7152], [0.0722]], 3, axis=1))
     each = np.array(
         [
-            sum.indirect(
+            ray_sum.indirect(
                 tracer, seen, Vpls(*(getattr(grey, f)[[i]] for f in ("position", "normal", "emission", "ray"))), **SHAPE
             )[:, 0]
             for i in range(len(vpls))

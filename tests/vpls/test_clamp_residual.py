@@ -13,7 +13,7 @@ from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import NEAR, Spotlight
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import sum as vpl_reference
+from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import cast
 from deferred_ir.vpls.clamp_residual import VplLimits, residual
 
@@ -93,7 +93,7 @@ def test_clamped_vpls_and_the_near_field_are_one_bounce():
     tracer = Tracer(scene)
     _, hits = seen_by(scene, tracer)
     vpls = cast(scene.spotlight, tracer, 2048, "sobol")
-    clamped = vpl_reference.indirect(tracer, hits, vpls, fov=180, clamp=clamp).reshape(SIZE[1], SIZE[0], 3)
+    clamped = ray_sum.indirect(tracer, hits, vpls, fov=180, clamp=clamp).reshape(SIZE[1], SIZE[0], 3)
     found = clamped + given_back(scene, clamp=clamp)
     truth = PathTracer(scene, tracer).estimate(SIZE, 256, seed=3)
     error = np.sqrt(truth.variance.sum(axis=(0, 1))) / truth.hit.size

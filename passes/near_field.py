@@ -8,16 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import sqrt
 from typing import ClassVar
 
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_buffer import LightsMeta
+from deferred_ir.frame.light_buffer import LightsMeta, read_limits
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
-from deferred_ir.vpls.clamp_residual import VplLimits, residual
+from deferred_ir.vpls.clamp_residual import residual
 from deferred_ir.vpls.interleaving import SharesMeta
 
 
@@ -69,7 +68,7 @@ class NearField(Pass):
             frame.scene.spotlight,
             frame.surfaces(io["depth"], io["normals"]),
             frame.size,
-            VplLimits(clamp=sqrt(vpl["clamp_squared"][0]), cosine=1 - float(vpl["one_minus_cos"][0])),
+            read_limits(vpl),
             samples=self.params.samples,
             block=io.meta("vpls", SharesMeta).n if io["vpls"] else 1,
             bounces=io.meta("lights", LightsMeta).bounces,

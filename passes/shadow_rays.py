@@ -13,13 +13,14 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.light_buffer import read_limits, read_vpls
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.rays.direct import on_pixels
 from deferred_ir.vpls.interleaving import places, share_starts
-from deferred_ir.vpls.ray_masks import BITS, cost_of_maps, cost_of_rays, masks
+from deferred_ir.vpls.ray_masks import BITS, cost_of_maps, cost_of_rays, trace_masks
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,11 @@ class ShadowRays(Pass):
         share, place = places(seen.pixel, frame.size, n)
         starts = share_starts(len(vpls), n)
         shares = [(np.flatnonzero(share == i), slice(int(starts[i]), int(starts[i + 1]))) for i in range(parts)]
-        words, _ = masks(tracer, seen, vpls, shares)
         width, height = frame.size
         image = np.zeros((io["masks"].description.layers, height * width), np.uint32)
-        image[: len(words), place] = words
+        if len(vpls):
+            words, _ = trace_masks(tracer, seen, read_vpls(vpls), read_limits(vpls), shares)
+            image[: len(words), place] = words
         io["masks"].upload(image.reshape(-1, height, width, 1))
         samples, light = self.params.disc_samples, frame.scene.spotlight
         direct = on_pixels(tracer, light, seen, frame.size, samples=samples, block=n, seed=frame.seed)

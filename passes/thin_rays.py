@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import closing
-from math import acos, degrees, sqrt
 from typing import ClassVar
 
 import numpy as np
@@ -15,14 +14,14 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.base.parallel import in_order
 from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.light_buffer import read_limits, read_vpls
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
-from deferred_ir.vpls.cast import Vpls
 from deferred_ir.vpls.interleaving import share_starts
-from deferred_ir.vpls.ray_sum import Lights, Patch
+from deferred_ir.vpls.ray_sum import ScaledSurfaces, ScaledVpls
 
 
 class ThinRays(Pass):
@@ -70,19 +69,15 @@ class ThinRays(Pass):
 def _irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, parts: int) -> Array:
     """Of surfaces (n), from those of `parts` shares of the VPLs (LIGHT records) that have a bit in bits (n, 2)."""
     geometry = tracer.scene.geometry
-    lights = Lights.of(
-        tracer,
-        Vpls(vpls["position"], vpls["z_axis"], vpls["emission"].astype(float), np.arange(len(vpls))),
-        fov=2 * degrees(acos(1 - float(vpls["one_minus_cos"][0]))),
-        clamp=sqrt(vpls["clamp_squared"][0]) / geometry.diagonal,
-    )
+    scaled = ScaledVpls.from_vpls(tracer, read_vpls(vpls), read_limits(vpls))
     starts = share_starts(len(vpls), round(parts**0.5)).tolist()
     hits = Hits(np.zeros(len(bits), int), seen.position, seen.normal, seen.shading_normal, np.ones((len(bits), 3)))
     rows = [np.flatnonzero(bits[:, share // 32] >> np.uint32(share % 32) & 1) for share in range(parts)]
     tasks = [share for share in range(parts) if len(rows[share]) and starts[share] < starts[share + 1]]
 
     def work(share: int) -> Array:
-        return Patch(tracer, hits.rows(rows[share])).irradiance(lights, slice(starts[share], starts[share + 1]))
+        surfaces = ScaledSurfaces(tracer, hits.rows(rows[share]))
+        return surfaces.sum_irradiance(scaled, slice(starts[share], starts[share + 1]))
 
     total = np.zeros((len(bits), 3))
     with closing(in_order(work, tasks)) as results:

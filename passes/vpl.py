@@ -17,7 +17,7 @@ from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Description, Output
 from deferred_ir.sampling.patterns import Pattern, warn_unbalanced
 from deferred_ir.vpls.cast import NONE, Vpls, cast
-from deferred_ir.vpls.resampling import effects, probes, resample
+from deferred_ir.vpls.resampling import estimate_effects, find_probes, resample
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,9 @@ class Vpl(Pass):
         count = max(p.count, -(-len(vpls) // p.candidates))
         if len(vpls) <= count:
             return vpls
-        seen = probes(tracer, frame.scene.camera, frame.size, seed)
-        return resample(vpls, effects(tracer, seen, vpls, fov=p.fov, clamp=p.clamp_fraction), count, seed)
+        seen = find_probes(tracer, frame.scene.camera, frame.size, seed)
+        effect = estimate_effects(tracer, seen, vpls, p.limits(frame.scene.geometry.diagonal))
+        return resample(vpls, effect, count, seed)
 
 
 PASS = Vpl

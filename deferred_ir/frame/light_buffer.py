@@ -17,6 +17,7 @@ from deferred_ir.scene.geometry import Geometry
 from deferred_ir.scene.lights.spot import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
 from deferred_ir.scene.scene import Scene
 from deferred_ir.vpls.cast import Vpls
+from deferred_ir.vpls.kernel import VplLimits
 
 AUTO_CLAMP = 0.64
 """Clamp distance of one VPL in diagonals where short rays give back what it takes: best at 64 to 1024 VPLs of both a
@@ -43,6 +44,10 @@ class VplParams:
     def clamp_fraction(self) -> float:
         """The clamp distance in diagonals. auto: in proportion to the distance between VPLs, whose spikes it holds."""
         return AUTO_CLAMP / sqrt(max(self.count, 1)) if self.clamp == "auto" else self.clamp
+
+    def limits(self, diagonal: float) -> VplLimits:
+        """Return cone and clamp of VPLs in a scene of this diagonal."""
+        return VplLimits.from_angle(self.fov, self.clamp_fraction * diagonal)
 
     def informed(self, facts: Facts) -> Facts:
         """Whether there will be VPLs, and a clamp that holds them."""
@@ -75,6 +80,17 @@ def packed(scene: Scene, vpls: Vpls, params: VplParams, tiles: Ints) -> np.ndarr
     records["clamp_squared"][0] = light.radius
     records["clamp_squared"][1:] = (params.clamp_fraction * scene.geometry.diagonal) ** 2
     return records
+
+
+def read_vpls(records: np.ndarray) -> Vpls:
+    """Return the VPLs of LIGHT records (n,), positions and normals in the records' single precision."""
+    emission = records["emission"].astype(float)
+    return Vpls(records["position"], records["z_axis"], emission, np.arange(len(records)))
+
+
+def read_limits(records: np.ndarray) -> VplLimits:
+    """Return cone and clamp of the VPLs in LIGHT records (n,), n > 0, in the precision in which shaders read them."""
+    return VplLimits(clamp=sqrt(records["clamp_squared"][0]), cosine=1 - float(records["one_minus_cos"][0]))
 
 
 def off_surface(scene: Scene, position: Array, normal: Array) -> Array:

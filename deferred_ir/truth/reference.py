@@ -19,8 +19,8 @@ from deferred_ir.graph.file import load_graph
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import NONE, cast
+from deferred_ir.vpls.ray_sum import sum_radiance
 
 DEFAULT_SPP = 64
 DISC_SAMPLES = 256
@@ -186,9 +186,8 @@ def _by_vpls(
     direct = paths.direct(size, DISC_SAMPLES, seed, threads)
     shines = bounces > 0 and any(scene.spotlight.emission)
     lights = cast(scene.spotlight, tracer, params.count, params.pattern, seed, bounces=bounces) if shines else NONE
-    indirect = ray_sum.indirect(
-        tracer, seen, lights, fov=params.fov, clamp=params.clamp_fraction, threads=threads, progress=progress
-    ).reshape(direct.shape)
+    limits = params.limits(scene.geometry.diagonal)
+    indirect = sum_radiance(tracer, seen, lights, limits, threads=threads, progress=progress).reshape(direct.shape)
     return Reference(
         (direct + indirect).astype(np.float32),
         direct.astype(np.float32),

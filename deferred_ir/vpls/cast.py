@@ -21,6 +21,7 @@ from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.sampling.patterns import Pattern, disc, systematic, unit_disc, unit_square
 from deferred_ir.scene.lights.spot import Spotlight, frames
+from deferred_ir.vpls.kernel import cosine_ratio
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +103,6 @@ def lift_to_hemisphere(points: Array, axes: Array) -> Array:
 def _land(tracer: Tracer, origins: Array, directions: Array, carried: Array) -> Vpls:
     """VPLs where rays land that carry `carried` (n, 3)."""
     hits = tracer.closest(origins, directions)
-    # Radiance at a hit goes with the shading normal's cosine to the light, but the surface that receives the ray and
-    # radiates is the geometric one; the ratio of the two cosines makes the sum exact (Veach 1997, section 5.3).
-    arriving = np.maximum(-(hits.shading_normal * directions).sum(axis=1), 0)
-    crossing = -(hits.normal * directions).sum(axis=1)
-    ratio = np.divide(arriving, crossing, out=np.zeros(len(crossing)), where=crossing > 0)
-    emission = carried * hits.albedo * ratio[:, None]
+    emission = carried * hits.albedo * cosine_ratio(hits.normal, hits.shading_normal, directions)[:, None]
     alive = np.flatnonzero(hits.hit & (emission > 0).any(axis=1))
     return Vpls(hits.position[alive], hits.normal[alive], emission[alive], alive)

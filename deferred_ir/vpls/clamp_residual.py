@@ -24,26 +24,10 @@ from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.sampling import pixel_blocks
 from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.vpls.kernel import VplLimits
 
 RAYS = 1 << 14
 """Rays of a task: few enough for their arrays to stay in a core's cache."""
-
-
-@dataclass(frozen=True)
-class VplLimits:
-    """What VPLs leave out of the light nearby. clamp: c, world units. cosine: of half their cone's angle."""
-
-    clamp: float
-    cosine: float = 0.0
-
-    def missing(self, square: Array, leaving: Array) -> Array:
-        """The share of light that VPLs at a squared distance (n,) do not bring; `leaving`: cosine there, (n,).
-
-        All of it outside their cone, and none from farther than c, where a cone's loss is theirs for good.
-        """
-        share: Array = np.maximum(1 - square / self.clamp**2, 0)
-        share[(leaving < self.cosine) & (share > 0)] = 1
-        return share
 
 
 def residual(

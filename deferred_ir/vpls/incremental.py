@@ -23,6 +23,7 @@ from deferred_ir.scene.geometry import carried
 from deferred_ir.scene.lights.spot import Spotlight, frames
 from deferred_ir.vpls.cast import Vpls
 from deferred_ir.vpls.emission_disc import EmissionDisc
+from deferred_ir.vpls.kernel import cosine_ratio
 from deferred_ir.vpls.stale_maps import StaleMaps
 
 BETTER = 1.05
@@ -211,8 +212,6 @@ class IncrementalVpls:
         slots = np.flatnonzero(self._shines())
         direction = self.direction[slots]
         power_of_cells = np.multiply.outer(power * self.weights[slots], np.asarray(light.emission, float))
-        arriving = np.maximum(-(self.shading_normal[slots] * direction).sum(axis=1), 0)
-        crossing = -(self.normal[slots] * direction).sum(axis=1)
-        ratio = np.divide(arriving, crossing, out=np.zeros(len(slots)), where=crossing > 0)
+        ratio = cosine_ratio(self.normal[slots], self.shading_normal[slots], direction)
         emission = power_of_cells * self.albedo[slots] * ratio[:, None]
         return Vpls(self.shown[slots], self.shown_normal[slots], emission, slots)

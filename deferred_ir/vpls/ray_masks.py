@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from deferred_ir.base.parallel import in_order
 from deferred_ir.graph.pass_base import Facts
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Tracer
+from deferred_ir.vpls.cast import Vpls
+from deferred_ir.vpls.kernel import VplLimits, find_lit
 
 PIXELS = 1 << 14
 """Pixels of a task: few enough for their arrays to stay in a core's cache, enough rays for one call of Embree."""
@@ -41,22 +44,32 @@ def cost_of_maps(facts: Facts) -> float:
     return (0.15 + 1.1e-4 * facts.triangles) * (1 if facts.software else 0.02)
 
 
-def masks(
-    tracer: Tracer, seen: Surfaces, vpls: np.ndarray, shares: Sequence[Share], threads: int | None = None
+def trace_masks(
+    tracer: Tracer,
+    seen: Surfaces,
+    vpls: Vpls,
+    limits: VplLimits,
+    shares: Sequence[Share],
+    *,
+    threads: int | None = None,
 ) -> tuple[Ints, int]:
-    """Which VPLs (LIGHT records) of their share the surfaces `seen` (n) see, and how many rays that took.
+    """Trace which VPLs of their share the surfaces `seen` (n) see. Returns the masks and the number of rays.
 
-    uint32 (words, n): bit b of word w stands for VPL 32 w + b of the share. It is 0 where one of the two faces away,
-    the surface lies outside the VPL's cone, or something lies between them. The same for any number of threads.
+    Masks are uint32 (words, n): bit b of word w stands for VPL 32 w + b of the share. It is 0 where one of the two
+    faces away, the surface lies outside the VPL's cone, or something lies between them. Positions and normals are taken
+    in single precision, as shaders take them. The result does not depend on the number of `threads`.
     """
-    most = max((lights.stop - lights.start for _, lights in shares), default=0)
+    most = max((chosen.stop - chosen.start for _, chosen in shares), default=0)
     words = np.zeros((max(-(-most // BITS), 1), len(seen.pixel)), np.uint32)
-    lifted = tracer.lift(vpls["position"].astype(np.float64), vpls["z_axis"]).astype(np.float32)
-    tasks = [(rows[start : start + PIXELS], lights) for rows, lights in shares for start in range(0, len(rows), PIXELS)]
+    lifted = tracer.lift(vpls.position.astype(np.float64), vpls.normal).astype(np.float32)
+    candidates = _Candidates(
+        vpls.position.astype(np.float32), vpls.normal.astype(np.float32), lifted, (vpls.emission != 0).any(axis=1)
+    )
+    tasks = [(rows[start : start + PIXELS], chosen) for rows, chosen in shares for start in range(0, len(rows), PIXELS)]
 
     def work(task: Share) -> tuple[Ints, int]:
-        rows, lights = task
-        return _look(tracer, seen, rows, vpls[lights], lifted[lights])
+        rows, chosen = task
+        return _trace(tracer, seen, rows, candidates.part(chosen), limits.edge)
 
     rays = 0
     with closing(in_order(work, tasks, threads)) as results:
@@ -66,38 +79,33 @@ def masks(
     return words, rays
 
 
-def _look(tracer: Tracer, seen: Surfaces, rows: Ints, vpls: np.ndarray, lifted: Array) -> tuple[Ints, int]:
-    """Words (w, n) of the surfaces `rows` (n) for all of `vpls`, and the number of rays."""
-    words = np.zeros((-(-len(vpls) // BITS), len(rows)), np.uint32)
+@dataclass(frozen=True, eq=False)
+class _Candidates:
+    """VPLs in single precision, (n, 3) each; `lifted` are their positions off their surfaces, `shines` is bool (n,)."""
+
+    position: Array
+    normal: Array
+    lifted: Array
+    shines: Bools
+
+    def part(self, chosen: slice) -> _Candidates:
+        """Return some of them."""
+        return _Candidates(self.position[chosen], self.normal[chosen], self.lifted[chosen], self.shines[chosen])
+
+
+def _trace(tracer: Tracer, seen: Surfaces, rows: Ints, vpls: _Candidates, edge: np.float32) -> tuple[Ints, int]:
+    """Return words (w, n) of the surfaces `rows` (n) for all of `vpls`, and the number of rays."""
+    words = np.zeros((-(-len(vpls.shines) // BITS), len(rows)), np.uint32)
     at, normal = seen.position[rows], seen.normal[rows]
     starts = tracer.lift(at, normal).astype(np.float32)
     position, face = np.ascontiguousarray(at.T), np.ascontiguousarray(normal.T)
     smooth = face if seen.shading_normal is seen.normal else np.ascontiguousarray(seen.shading_normal[rows].T)
     rays = 0
-    for i, vpl in enumerate(vpls):
-        asked = np.flatnonzero(_lit(vpl, position, face, smooth)) if vpl["emission"].any() else np.zeros(0, int)
+    for i in np.flatnonzero(vpls.shines).tolist():
+        lit = find_lit(position - vpls.position[i][:, None], vpls.normal[i], face, smooth, edge)
+        asked = np.flatnonzero(lit)
         origins = starts[asked]
-        free = asked[~tracer.occluded(origins, np.broadcast_to(lifted[i], origins.shape), lifted=True)]
+        free = asked[~tracer.occluded(origins, np.broadcast_to(vpls.lifted[i], origins.shape), lifted=True)]
         words[i // BITS, free] |= np.uint32(1 << i % BITS)
         rays += len(asked)
     return words, rays
-
-
-def _lit(vpl: np.void, position: Array, normal: Array, shading_normal: Array) -> Bools:
-    """Whether a VPL would light surfaces, (3, n) each, if nothing lay between: shaders/lib/lights/light.glsl, (n,)."""
-    way = position - vpl["position"][:, None]
-    leaving = _dot(vpl["z_axis"], way)
-    edge = 1 - vpl["one_minus_cos"]
-    lit: Bools = (leaving > 0) & (_dot(normal, way) < 0)
-    lit &= leaving * leaving >= edge * edge * _dot(way, way)
-    if shading_normal is not normal:
-        lit &= _dot(shading_normal, way) < 0
-    return lit
-
-
-def _dot(a: Array, b: Array) -> Array:
-    """Products of vectors whose coordinates are the first axis, added up."""
-    total: Array = a[0] * b[0]
-    total += a[1] * b[1]
-    total += a[2] * b[2]
-    return total

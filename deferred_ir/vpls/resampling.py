@@ -28,7 +28,8 @@ from deferred_ir.sampling.hilbert import hilbert_order
 from deferred_ir.sampling.patterns import systematic, unit_square
 from deferred_ir.scene.camera import Camera
 from deferred_ir.vpls.cast import LUMINANCE, Vpls
-from deferred_ir.vpls.ray_sum import Lights, Patch
+from deferred_ir.vpls.kernel import VplLimits
+from deferred_ir.vpls.ray_sum import ScaledSurfaces, ScaledVpls
 
 PROBES = 128
 """Pixels at which effects are estimated."""
@@ -44,8 +45,8 @@ STREAM = 65537
 """Keeps random numbers apart from those of the bounces."""
 
 
-def probes(tracer: Tracer, camera: Camera, size: tuple[int, int], seed: int = 0) -> Hits:
-    """Surfaces behind up to PROBES well-spread pixel centres of an image of `size` (width, height)."""
+def find_probes(tracer: Tracer, camera: Camera, size: tuple[int, int], seed: int = 0) -> Hits:
+    """Return the surfaces behind up to PROBES well-spread pixel centres of an image of `size` (width, height)."""
     pixels = np.floor(unit_square("sobol", TRIES, seed + STREAM) * size) + 0.5
     x, y = (pixels / size * 2 - 1).T
     directions = np.column_stack([x, y, np.ones(TRIES)]) @ camera.ray_axes(size)
@@ -53,20 +54,20 @@ def probes(tracer: Tracer, camera: Camera, size: tuple[int, int], seed: int = 0)
     return seen.rows(np.flatnonzero(seen.hit)[:PROBES])
 
 
-def effects(tracer: Tracer, seen: Hits, vpls: Vpls, *, fov: float, clamp: float, threads: int | None = None) -> Array:
-    """The effect of each of `vpls` (n) on the surfaces `seen`, float64 (n,), in no unit; 0 where it lights none.
+def estimate_effects(tracer: Tracer, seen: Hits, vpls: Vpls, limits: VplLimits, *, threads: int | None = None) -> Array:
+    """Return the effect of each of `vpls` (n) on the surfaces `seen`, float64 (n,), in no unit; 0 if it lights none.
 
-    fov, clamp: as in vpl_reference.indirect. The same for any number of threads.
+    The result does not depend on the number of `threads`.
     """
-    lights = Lights.of(tracer, vpls, fov=fov, clamp=clamp)
+    scaled = ScaledVpls.from_vpls(tracer, vpls, limits)
     power = vpls.emission @ LUMINANCE
     power = (power / power.max(initial=np.finfo(float).tiny)).astype(np.float32)
     step = max(1, PAIRS // max(len(vpls), 1))
     pixels = np.arange(len(seen.face))
-    tasks = [Patch(tracer, seen.rows(pixels[start : start + step])) for start in range(0, len(pixels), step)]
+    tasks = [ScaledSurfaces(tracer, seen.rows(pixels[start : start + step])) for start in range(0, len(pixels), step)]
 
-    def work(patch: Patch) -> Array:
-        added = patch.kernels(lights) * power
+    def work(surfaces: ScaledSurfaces) -> Array:
+        added = surfaces.weigh_pairs(scaled) * power
         total = added.sum(axis=1, keepdims=True)
         share = np.divide(added, total, out=added, where=total > 0)
         squares: Array = np.einsum("ij,ij->j", share, share)

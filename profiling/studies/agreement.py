@@ -19,8 +19,9 @@ from deferred_ir.profiling.measure import arguments
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import cast
+from deferred_ir.vpls.kernel import VplLimits
+from deferred_ir.vpls.ray_sum import sum_radiance
 
 BLOCK = 8
 SCRAMBLES, COUNT, SPP = 16, 1024, 256
@@ -40,10 +41,10 @@ def measure(scene: Scene, size: tuple[int, int], clamp: float, fov: float) -> di
     seen, traced = judge.seen(size), judge.estimate(size, SPP, seed=7)
     if traced.variance is None:
         raise ValueError(f"{SPP} paths a pixel tell no variance")
-    sums = []
+    limits, sums = VplLimits.from_angle(fov, clamp * scene.geometry.diagonal), []
     for seed in track(range(SCRAMBLES), scene.name):
         vpls = cast(scene.spotlight, tracer, COUNT, "sobol", seed)
-        sums.append(blocks(ray_sum.indirect(tracer, seen, vpls, fov=fov, clamp=clamp).reshape(traced.indirect.shape)))
+        sums.append(blocks(sum_radiance(tracer, seen, vpls, limits).reshape(traced.indirect.shape)))
     ours, paths = np.array(sums), blocks(traced.indirect)
     variance = ours.var(axis=0, ddof=1) / SCRAMBLES + blocks(traced.variance) / BLOCK**2
     lit = (paths > 0).all(axis=-1)

@@ -19,8 +19,9 @@ from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import cast
+from deferred_ir.vpls.kernel import VplLimits
+from deferred_ir.vpls.ray_sum import sum_radiance
 
 SIZE = (96, 96)
 CLAMPS = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1)
@@ -41,7 +42,8 @@ def measure(scene: Scene, fov: float) -> dict[str, list[float]]:
             for seed in range(SEEDS):
                 vpls = cast(scene.spotlight, tracer, count, "sobol", seed)
                 for i, clamp in enumerate(CLAMPS):
-                    indirect = ray_sum.indirect(tracer, seen, vpls, fov=fov, clamp=clamp)
+                    limits = VplLimits.from_angle(fov, clamp * scene.geometry.diagonal)
+                    indirect = sum_radiance(tracer, seen, vpls, limits)
                     image = truth.direct + indirect.reshape(reference.shape)
                     errors[str(count)][i] += relmse(image, reference, truth.hit)[0] / SEEDS
                     bar.advance()

@@ -13,9 +13,10 @@ from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import load_graph
 from deferred_ir.graph.pass_base import Facts
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import Vpls, cast
 from deferred_ir.vpls.interleaving import dealt, places, share_starts, sub_buffers
+from deferred_ir.vpls.kernel import VplLimits
+from deferred_ir.vpls.ray_sum import sum_radiance
 
 SIZE = (50, 38)  # no multiple of 4
 RAYS = {"shadow_rays.visibility": "rays", "vpl.clamp": 0.02, "vpl.candidates": 1}
@@ -37,7 +38,8 @@ def read(one, source):
 def irradiance(tracer, hits, vpls, clamp=0.02):
     """Of all VPLs by the reference, (n, 3)."""
     white = replace(hits, albedo=np.full(hits.albedo.shape, np.pi))
-    return ray_sum.indirect(tracer, white, vpls, fov=179.9, clamp=clamp)
+    limits = VplLimits.from_angle(179.9, clamp * tracer.scene.geometry.diagonal)
+    return sum_radiance(tracer, white, vpls, limits)
 
 
 @pytest.mark.parametrize(("n", "count"), [(4, 45), (2, 500)])

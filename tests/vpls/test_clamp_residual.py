@@ -13,9 +13,10 @@ from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import NEAR, Spotlight
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import cast
-from deferred_ir.vpls.clamp_residual import VplLimits, residual
+from deferred_ir.vpls.clamp_residual import residual
+from deferred_ir.vpls.kernel import VplLimits
+from deferred_ir.vpls.ray_sum import sum_radiance
 
 SIZE = (48, 32)
 
@@ -34,8 +35,7 @@ def given_back(scene, *, clamp, fov=180.0, seed=0, size=SIZE, samples=16.0, bloc
     """Radiance that the near field brings, (H, W, 3), top row first."""
     tracer = Tracer(scene)
     seen, hits = seen_by(scene, tracer, size)
-    cosine = 0.0 if fov >= 180 else float(np.cos(np.radians(fov / 2)))
-    limits = VplLimits(clamp * scene.geometry.diagonal, cosine)
+    limits = VplLimits.from_angle(fov, clamp * scene.geometry.diagonal)
     options = {"samples": samples, "block": block, "seed": seed, **options}
     image = residual(tracer, scene.spotlight, seen, size, limits, **options)
     return image[..., :3] * hits.albedo.reshape(*image.shape[:2], 3) / np.pi
@@ -93,7 +93,8 @@ def test_clamped_vpls_and_the_near_field_are_one_bounce():
     tracer = Tracer(scene)
     _, hits = seen_by(scene, tracer)
     vpls = cast(scene.spotlight, tracer, 2048, "sobol")
-    clamped = ray_sum.indirect(tracer, hits, vpls, fov=180, clamp=clamp).reshape(SIZE[1], SIZE[0], 3)
+    limits = VplLimits(clamp * scene.geometry.diagonal)
+    clamped = sum_radiance(tracer, hits, vpls, limits).reshape(SIZE[1], SIZE[0], 3)
     found = clamped + given_back(scene, clamp=clamp)
     truth = PathTracer(scene, tracer).estimate(SIZE, 256, seed=3)
     error = np.sqrt(truth.variance.sum(axis=(0, 1))) / truth.hit.size

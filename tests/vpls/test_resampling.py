@@ -13,13 +13,17 @@ from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.motion import CameraMotion
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.vpls import ray_sum
 from deferred_ir.vpls.cast import NONE, Vpls, cast
-from deferred_ir.vpls.resampling import EVEN, PROBES, effects, probes, resample
+from deferred_ir.vpls.kernel import VplLimits
+from deferred_ir.vpls.ray_sum import sum_radiance
+from deferred_ir.vpls.resampling import EVEN, PROBES, estimate_effects, find_probes, resample
 
-SHAPE = {"fov": 179.9, "clamp": 0.02}
 SIZE = (64, 48)
 ROOMS = two_rooms()
+
+
+def limits(scene=ROOMS):
+    return VplLimits.from_angle(179.9, 0.02 * scene.geometry.diagonal)
 
 
 def candidates(scene=ROOMS, count=1024, seed=0, bounces=1):
@@ -30,13 +34,14 @@ def chosen(scene, count, seed, bounces=1, factor=16):
     """As a render with `vpl.candidates` chooses."""
     tracer = Tracer(scene)
     vpls = cast(scene.spotlight, tracer, count * factor, "sobol", seed, bounces=bounces)
-    return resample(vpls, effects(tracer, probes(tracer, scene.camera, SIZE, seed), vpls, **SHAPE), count, seed)
+    seen = find_probes(tracer, scene.camera, SIZE, seed)
+    return resample(vpls, estimate_effects(tracer, seen, vpls, limits(scene)), count, seed)
 
 
 def indirect(scene, vpls, size=(16, 12)):
     tracer = Tracer(scene)
     seen = PathTracer(scene, tracer).seen(size)
-    return ray_sum.indirect(tracer, seen, vpls, **SHAPE).reshape(size[1], size[0], 3)
+    return sum_radiance(tracer, seen, vpls, limits(scene)).reshape(size[1], size[0], 3)
 
 
 def made_up(count, seed=0):
@@ -57,7 +62,7 @@ def lights(one):
 def test_a_choice_is_right_on_average_in_every_pixel():
     vpls = candidates()
     tracer = Tracer(ROOMS)
-    effect = effects(tracer, probes(tracer, ROOMS.camera, SIZE), vpls, **SHAPE)
+    effect = estimate_effects(tracer, find_probes(tracer, ROOMS.camera, SIZE), vpls, limits())
     images = np.array([indirect(ROOMS, resample(vpls, effect, 32, seed), (6, 4)) for seed in range(150)])
     error = images.std(axis=0) / np.sqrt(len(images))
     off = np.abs(images.mean(axis=0) - indirect(ROOMS, vpls, (6, 4))) / error
@@ -127,44 +132,50 @@ def test_vpls_at_one_point_are_fine():
 
 def test_effects_are_what_a_pixel_gets_over_what_all_give_it():
     tracer, vpls = Tracer(ROOMS), candidates(count=64)
-    seen = probes(tracer, ROOMS.camera, SIZE)
+    seen = find_probes(tracer, ROOMS.camera, SIZE)
     grey = replace(vpls, emission=np.repeat(vpls.emission @ [[0.2126], [0.7152], [0.0722]], 3, axis=1))
     each = np.array(
         [
-            ray_sum.indirect(
-                tracer, seen, Vpls(*(getattr(grey, f)[[i]] for f in ("position", "normal", "emission", "ray"))), **SHAPE
+            sum_radiance(
+                tracer,
+                seen,
+                Vpls(*(getattr(grey, f)[[i]] for f in ("position", "normal", "emission", "ray"))),
+                limits(),
             )[:, 0]
             for i in range(len(vpls))
         ]
     )
     total = each.sum(axis=0)
     share = each[:, total > 0] / total[total > 0]
-    np.testing.assert_allclose(effects(tracer, seen, vpls, **SHAPE), np.sqrt((share**2).sum(axis=1)), rtol=1e-4)
+    np.testing.assert_allclose(
+        estimate_effects(tracer, seen, vpls, limits()), np.sqrt((share**2).sum(axis=1)), rtol=1e-4
+    )
 
 
 @pytest.mark.parametrize("count", [0, 5, 3000])
 def test_any_number_of_threads_gives_the_same(count):
     tracer, vpls = Tracer(ROOMS), candidates(count=count)
-    seen = probes(tracer, ROOMS.camera, SIZE)
-    one, four = (effects(tracer, seen, vpls, **SHAPE, threads=threads) for threads in (1, 4))
+    seen = find_probes(tracer, ROOMS.camera, SIZE)
+    one, four = (estimate_effects(tracer, seen, vpls, limits(), threads=threads) for threads in (1, 4))
     np.testing.assert_array_equal(one, four)
     assert one.shape == (len(vpls),)
 
 
 def test_extreme_power_and_no_clamp_leave_effects_finite():
     tracer, vpls = Tracer(ROOMS), candidates(count=64)
-    seen = probes(tracer, ROOMS.camera, SIZE)
-    usual = effects(tracer, seen, vpls, fov=150.0, clamp=0.0)
+    seen = find_probes(tracer, ROOMS.camera, SIZE)
+    unclamped = VplLimits.from_angle(150.0, 0.0)
+    usual = estimate_effects(tracer, seen, vpls, unclamped)
     for factor in (1e-300, 1e200):
         extreme = replace(vpls, emission=vpls.emission * factor)
-        np.testing.assert_allclose(effects(tracer, seen, extreme, fov=150.0, clamp=0.0), usual, rtol=1e-5)
+        np.testing.assert_allclose(estimate_effects(tracer, seen, extreme, unclamped), usual, rtol=1e-5)
     dark = replace(vpls, emission=vpls.emission * 0)
-    np.testing.assert_array_equal(effects(tracer, seen, dark, **SHAPE), 0)
+    np.testing.assert_array_equal(estimate_effects(tracer, seen, dark, limits()), 0)
 
 
 def test_probes_are_pixels_of_the_image_all_over_it():
     scene, tracer = room(), Tracer(room())
-    seen = probes(tracer, scene.camera, (16, 8))
+    seen = find_probes(tracer, scene.camera, (16, 8))
     assert len(seen.face) == PROBES
     pixels = PathTracer(scene, tracer).seen((16, 8)).position
     nearest = np.linalg.norm(seen.position[:, None] - pixels, axis=2)
@@ -174,11 +185,11 @@ def test_probes_are_pixels_of_the_image_all_over_it():
 
 def test_probes_pass_over_the_background():
     small = build(plane(0.3), camera=Camera((0, 3, 0.1), (0, 0, 0), fov=40.0))
-    seen = probes(Tracer(small), small.camera, (64, 64))
+    seen = find_probes(Tracer(small), small.camera, (64, 64))
     assert 20 < len(seen.face) <= PROBES
     assert seen.hit.all()
     away = replace(small.camera, look_at=(0.0, 9.0, 0.0))
-    assert len(probes(Tracer(small), away, (64, 64)).face) == 0
+    assert len(find_probes(Tracer(small), away, (64, 64)).face) == 0
 
 
 # What it is for

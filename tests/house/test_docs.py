@@ -62,7 +62,7 @@ def test_commands_are_understood(page):
     for line in COMMAND.findall(page.read_text(encoding="utf-8")):
         words = shlex.split(re.split(r" [|>&] ?", line)[0], comments=True)
         try:
-            main._parser().parse_args(words[1:])
+            main._parse(words[1:])
         except SystemExit:
             pytest.fail(f"{page.name}: {line}")
 

@@ -24,7 +24,7 @@ from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
-from deferred_ir.vpls.interleaving import SharesMeta, share_starts
+from deferred_ir.vpls.interleaving import SharesMeta, find_share_starts
 
 IRRADIANCE, THIN, COUNT, MISSING = range(4)
 """Image units that the shaders declare."""
@@ -125,7 +125,7 @@ class Gather(Pass):
 
 def _ranges(vpls: np.ndarray, shares: int, start: int, stop: int) -> Ints:
     """Where in the block from `start` to `stop` of VPLs, LIGHT records (n,), each share begins and ends, int (s, 2)."""
-    starts = np.clip(share_starts(len(vpls), round(shares**0.5)), start, stop)
+    starts = np.clip(find_share_starts(len(vpls), round(shares**0.5)), start, stop)
     ends = [first + last_shining(vpls[first:end]) for first, end in itertools.pairwise(starts)]
     ranges: Ints = np.column_stack([starts[:-1], ends]) - start
     return np.where((ranges[:, 1] > ranges[:, 0])[:, None], ranges, 0)

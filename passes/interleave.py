@@ -15,7 +15,7 @@ from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output
-from deferred_ir.vpls.interleaving import SharesMeta, dealt, share_starts
+from deferred_ir.vpls.interleaving import SharesMeta, deal, find_share_starts
 
 
 @dataclass(frozen=True)
@@ -59,9 +59,9 @@ class Interleave(Pass):
         del frame
         lights = io["lights"].records
         vpls = lights[in_order(lights)[1:]]
-        order = dealt(vpls["tile"].astype(int), io["lights"].description.records - 1)
+        order = deal(vpls["tile"].astype(int), io["lights"].description.records - 1)
         parts = np.union1d(
-            share_starts(len(vpls), self.params.n), np.arange(0, len(vpls), io["vpls"].description.block)
+            find_share_starts(len(vpls), self.params.n), np.arange(0, len(vpls), io["vpls"].description.block)
         )
         io["vpls"].write(shining_first(vpls[order], parts))
 

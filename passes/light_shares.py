@@ -15,7 +15,7 @@ from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
-from deferred_ir.vpls.interleaving import SharesMeta, share_starts, sub_buffers
+from deferred_ir.vpls.interleaving import SharesMeta, find_share_starts, find_sub_buffers
 
 
 class Interleaved(Pass):
@@ -49,8 +49,8 @@ class Interleaved(Pass):
         ctx, block = io.gpu.ctx, vpls.description.block
         program = io.program("light_shares.frag", defines=shader_variants.of_pixels(frame, vpls.records))
         ctx.blend_func = ctx.ONE, ctx.ONE
-        starts = share_starts(len(vpls.records), n).tolist()
-        for share, rectangle in enumerate(sub_buffers(frame.size, n)):
+        starts = find_share_starts(len(vpls.records), n).tolist()
+        for share, rectangle in enumerate(find_sub_buffers(frame.size, n)):
             io.gpu.gl.Viewport(*rectangle)
             start, stop = starts[share : share + 2]
             # An empty share is drawn as well: the filter counts its pixels.

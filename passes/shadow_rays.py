@@ -12,6 +12,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from deferred_ir.frame.costs import estimate_map_cost, estimate_ray_cost
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_buffer import read_limits, read_vpls
 from deferred_ir.frame.pass_io import Io
@@ -19,8 +20,8 @@ from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Facts, Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.rays.direct import on_pixels
-from deferred_ir.vpls.interleaving import places, share_starts
-from deferred_ir.vpls.ray_masks import BITS, cost_of_maps, cost_of_rays, trace_masks
+from deferred_ir.vpls.interleaving import find_places, find_share_starts
+from deferred_ir.vpls.ray_masks import BITS, trace_masks
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,8 @@ class ShadowRays(Pass):
             return "the spotlight emits nothing"
         if self.params.visibility == "maps":
             return "visibility is 'maps'"
-        maps, rays = cost_of_maps(facts), cost_of_rays(facts)
+        maps = estimate_map_cost(facts.triangles, software=facts.software)
+        rays = estimate_ray_cost(facts.pixels, facts.shares)
         if self.params.visibility == "rays" or rays < maps:
             return None
         return f"maps should take less time: {maps:.2g} ms for each VPL, rays {rays:.2g} ms"
@@ -77,8 +79,8 @@ class ShadowRays(Pass):
         vpls, parts = io["vpls"].records, io["vpls"].description.parts
         tracer, seen = frame.tracer(), frame.surfaces(io["depth"], io["normals"])
         n = round(parts**0.5)
-        share, place = places(seen.pixel, frame.size, n)
-        starts = share_starts(len(vpls), n)
+        share, place = find_places(seen.pixel, frame.size, n)
+        starts = find_share_starts(len(vpls), n)
         shares = [(np.flatnonzero(share == i), slice(int(starts[i]), int(starts[i + 1]))) for i in range(parts)]
         width, height = frame.size
         image = np.zeros((io["masks"].description.layers, height * width), np.uint32)

@@ -20,7 +20,7 @@ from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
-from deferred_ir.vpls.interleaving import share_starts
+from deferred_ir.vpls.interleaving import find_share_starts
 from deferred_ir.vpls.ray_sum import ScaledSurfaces, ScaledVpls
 
 
@@ -70,7 +70,7 @@ def _irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, pa
     """Of surfaces (n), from those of `parts` shares of the VPLs (LIGHT records) that have a bit in bits (n, 2)."""
     geometry = tracer.scene.geometry
     scaled = ScaledVpls.from_vpls(tracer, read_vpls(vpls), read_limits(vpls))
-    starts = share_starts(len(vpls), round(parts**0.5)).tolist()
+    starts = find_share_starts(len(vpls), round(parts**0.5)).tolist()
     hits = Hits(np.zeros(len(bits), int), seen.position, seen.normal, seen.shading_normal, np.ones((len(bits), 3)))
     rows = [np.flatnonzero(bits[:, share // 32] >> np.uint32(share % 32) & 1) for share in range(parts)]
     tasks = [share for share in range(parts) if len(rows[share]) and starts[share] < starts[share + 1]]

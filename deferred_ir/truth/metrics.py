@@ -140,11 +140,6 @@ def compare(
     )
 
 
-def error_map(image: Any, reference: Any, hit: Hit = None) -> Array:
-    """(H, W): (I - R)^2 / (R^2 + 0.01 mean(R)^2), averaged over RGB. Its mean over the hit pixels is relMSE."""
-    return _pair(image, reference, hit, NAMES).errors()
-
-
 def relmse(image: Any, reference: Any, hit: Hit = None) -> tuple[float, float]:
     """relMSE, trimmed of the worst 0.1 % of the pixels (one pixel at least is kept), and untrimmed."""
     return _pair(image, reference, hit, NAMES).relmse()

@@ -1,8 +1,8 @@
 """Interleaved sampling (Keller and Heidrich 2001): which VPLs light which pixels, and where those pixels stand.
 
-Each pixel of an n x n block is lit by a share of the VPLs. Pixels with the same share stand together in a sub-buffer
-(Segovia et al. 2006), so that one draw with one list of lights serves them all: pixel (x, y) has the share
-(y mod n) n + x mod n. shaders/lib/shares/places.glsl finds the same places.
+The pixels of an n x n block divide the VPLs among them: each is lit by a share of its own, n^2 shares in all. Pixels
+with the same share stand together in a sub-buffer (Segovia et al. 2006), so that one draw with one list of lights
+serves them all. Pixel (x, y) has share (y mod n) n + x mod n; shaders/lib/shares/places.glsl finds the same places.
 """
 
 from __future__ import annotations
@@ -19,43 +19,53 @@ SHUFFLE = 8191
 
 @dataclass(frozen=True)
 class SharesMeta:
-    """How VPLs are dealt. n: edge of a block of pixels, each of which is lit by one of n^2 shares."""
+    """The size of a block. n: pixels along an edge; each pixel is lit by one of n^2 shares."""
 
     n: int
 
 
-def dealt(slots: Ints, capacity: int) -> Ints:
-    """In which order VPLs are dealt to the shares: int (n,), of VPLs with `slots` (n,) out of `capacity`, each its own.
+def deal(slots: Ints, capacity: int) -> Ints:
+    """Return the order in which VPLs are dealt to the shares, int (n,).
 
-    Shuffled, so that what is left of the pattern has no structure, and by slots: where VPLs come and go, those that
-    stay keep their order, and all but a few their shares.
+    slots: int (n,), different numbers below `capacity`, one for each VPL. The order is shuffled, so that what a share
+    takes of the sample pattern has no structure, and it goes by slots: where VPLs come and go, the others keep their
+    order, and all but a few their shares.
     """
     ranks = np.empty(capacity, np.intp)
     ranks[np.random.Generator(np.random.PCG64(SHUFFLE)).permutation(capacity)] = np.arange(capacity)
     return np.argsort(ranks[slots])
 
 
-def share_starts(count: int, n: int) -> Ints:
-    """Where the n^2 shares of `count` VPLs begin and the last ends, int (n^2 + 1,); they differ by one at most."""
-    begins: Ints = np.arange(n * n + 1) * count // (n * n)
-    return begins
+def find_share_starts(count: int, n: int) -> Ints:
+    """Return where each of the n^2 shares of `count` VPLs starts, and where the last ends, int (n^2 + 1,).
+
+    Their sizes differ by one at most.
+    """
+    starts: Ints = np.arange(n * n + 1) * count // (n * n)
+    return starts
 
 
-def sub_buffers(size: tuple[int, int], n: int) -> list[tuple[int, int, int, int]]:
-    """Rectangle (x, y, width, height) of each share in a texture of `size`; one may be a pixel larger than the next."""
-    columns, rows = (_parts(length, n) for length in size)
+def find_sub_buffers(size: tuple[int, int], n: int) -> list[tuple[int, int, int, int]]:
+    """Return each share's rectangle (x, y, width, height) in a texture of `size` (width, height).
+
+    Where n does not divide the size, some are a pixel larger than others.
+    """
+    columns, rows = (_split(length, n) for length in size)
     return [(x, y, width, height) for y, height in rows for x, width in columns]
 
 
-def places(pixel: Ints, size: tuple[int, int], n: int) -> tuple[Ints, Ints]:
-    """The shares of pixels (m,), numbered row by row, and where they stand in the texture of sub-buffers, int (m,)."""
+def find_places(pixel: Ints, size: tuple[int, int], n: int) -> tuple[Ints, Ints]:
+    """Return the shares of pixels (m,), and where those pixels stand in the texture of sub-buffers, both int (m,).
+
+    pixel: row * width + column in an image of `size` (width, height). The places are numbered in the same way.
+    """
     width, height = size
     y, x = np.divmod(pixel, width)
-    columns, rows = (np.array([start for start, _ in _parts(length, n)]) for length in (width, height))
+    columns, rows = (np.array([start for start, _ in _split(length, n)]) for length in (width, height))
     return y % n * n + x % n, (rows[y % n] + y // n) * width + columns[x % n] + x // n
 
 
-def _parts(length: int, n: int) -> list[tuple[int, int]]:
-    """Start and length of the part that holds every n-th of `length` pixels, for each of the n offsets."""
+def _split(length: int, n: int) -> list[tuple[int, int]]:
+    """Return start and length of the interval that holds every n-th of `length` pixels, for each of the n offsets."""
     whole, rest = divmod(length, n)
     return [(i * whole + min(i, rest), whole + (i < rest)) for i in range(n)]

@@ -6,7 +6,6 @@ scene for each VPL. Pairs that bring nothing, since one of the two faces away, a
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -15,7 +14,6 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.parallel import in_order
-from deferred_ir.graph.pass_base import Facts
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.vpls.cast import Vpls
@@ -27,21 +25,8 @@ PIXELS = 1 << 14
 BITS = 32
 """VPLs in a word."""
 
-THIN = 0.1
-"""Part of all VPLs that a pixel asks beyond its share, on average: those missing beside edges; a guess, for costs."""
-
 Share = tuple[Ints, slice]
 """Rows of surfaces, and the VPLs that light them."""
-
-
-def cost_of_rays(facts: Facts) -> float:
-    """Milliseconds that each VPL should take: 0.1 us of a core for a pixel in a room, 0.17 us in a cathedral."""
-    return facts.pixels * (1 / facts.shares + THIN) * 1.5e-4 / (os.cpu_count() or 1)
-
-
-def cost_of_maps(facts: Facts) -> float:
-    """Milliseconds that a VPL's map should take: measured with OpenGL in software; a GPU takes a small part of it."""
-    return (0.15 + 1.1e-4 * facts.triangles) * (1 if facts.software else 0.02)
 
 
 def trace_masks(

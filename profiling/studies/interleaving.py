@@ -23,7 +23,7 @@ from deferred_ir.loading.load import load
 from deferred_ir.profiling.measure import arguments, panels
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
-from deferred_ir.vpls.interleaving import sub_buffers
+from deferred_ir.vpls.interleaving import find_sub_buffers
 
 SIZE = 512, 512
 VPLS = 64, 256, 1024
@@ -106,7 +106,7 @@ def pictures(scene: Scene, path: Path, n: int = 4) -> None:
         full = one.render(scene, vpls=256).radiance
         direct = one.render(scene, vpls=0).radiance
     whole = np.empty_like(shares)
-    for share, (x, y, width, height) in enumerate(sub_buffers(SIZE, n)):
+    for share, (x, y, width, height) in enumerate(find_sub_buffers(SIZE, n)):
         whole[share // n :: n, share % n :: n] = shares[y : y + height, x : x + width]
     unfiltered = direct + albedo * whole[::-1] / np.pi
     white = np.quantile(full[CROP], 0.98)

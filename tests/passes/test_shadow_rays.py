@@ -14,7 +14,7 @@ from deferred_ir.graph.file import load_graph
 from deferred_ir.graph.pass_base import Facts
 from deferred_ir.truth.path_tracer import PathTracer
 from deferred_ir.vpls.cast import Vpls, cast
-from deferred_ir.vpls.interleaving import dealt, places, share_starts, sub_buffers
+from deferred_ir.vpls.interleaving import deal, find_places, find_share_starts, find_sub_buffers
 from deferred_ir.vpls.kernel import VplLimits
 from deferred_ir.vpls.ray_sum import sum_radiance
 
@@ -54,8 +54,8 @@ def test_sub_buffers_hold_what_the_reference_finds_for_each_share(renderer, n, c
     pixel = np.arange(SIZE[0] * SIZE[1])
     hits = hits.rows((SIZE[1] - 1 - pixel // SIZE[0]) * SIZE[0] + pixel % SIZE[0])  # bottom row first
     vpls = cast(scene.spotlight, tracer, count, "sobol")
-    order, starts = dealt(np.arange(len(vpls)), count), share_starts(len(vpls), n)
-    share, place = places(pixel, SIZE, n)
+    order, starts = deal(np.arange(len(vpls)), count), find_share_starts(len(vpls), n)
+    share, place = find_places(pixel, SIZE, n)
     expected = np.zeros((len(pixel), 3))
     for s in range(n * n):
         rows, lights = np.flatnonzero(share == s), order[starts[s] : starts[s + 1]]
@@ -68,9 +68,9 @@ def test_sub_buffers_hold_what_the_reference_finds_for_each_share(renderer, n, c
 
 def test_places_are_those_of_the_sub_buffers():
     pixel = np.arange(SIZE[0] * SIZE[1])
-    share, place = places(pixel, SIZE, 4)
+    share, place = find_places(pixel, SIZE, 4)
     np.testing.assert_array_equal(np.sort(place), pixel)
-    for s, (x, y, width, height) in enumerate(sub_buffers(SIZE, 4)):
+    for s, (x, y, width, height) in enumerate(find_sub_buffers(SIZE, 4)):
         row, column = np.divmod(place[share == s], SIZE[0])
         assert (row.min(), row.max(), column.min(), column.max()) == (y, y + height - 1, x, x + width - 1)
 

@@ -16,7 +16,7 @@ from deferred_ir.rays.pixel_surfaces import from_gbuffer
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import NEAR
-from deferred_ir.vpls.interleaving import dealt, share_starts, sub_buffers
+from deferred_ir.vpls.interleaving import deal, find_share_starts, find_sub_buffers
 
 ANGLE = np.radians(25)
 ABOVE = Camera((0.0, 3.0, 0.001), (0.0, 0.0, 0.0), fov=30.0)
@@ -25,28 +25,28 @@ ABOVE = Camera((0.0, 3.0, 0.001), (0.0, 0.0, 0.0), fov=30.0)
 @given(count=st.integers(0, 5000), more=st.integers(0, 100), n=st.sampled_from([1, 2, 4, 8]))
 def test_every_vpl_is_dealt_once_and_shares_are_even(count, more, n):
     slots = np.random.default_rng(count).permutation(count + more)[:count]
-    starts = share_starts(count, n)
-    assert sorted(dealt(slots, count + more)) == list(range(count))
+    starts = find_share_starts(count, n)
+    assert sorted(deal(slots, count + more)) == list(range(count))
     assert (starts[0], starts[-1]) == (0, count)
     assert len(starts) == n * n + 1
     assert np.ptp(np.diff(starts)) <= 1
 
 
 def test_the_order_is_fixed_and_has_no_structure():
-    order = dealt(np.arange(1024), 1024)
-    assert (order == dealt(np.arange(1024), 1024)).all()
+    order = deal(np.arange(1024), 1024)
+    assert (order == deal(np.arange(1024), 1024)).all()
     assert abs(np.corrcoef(order, np.arange(1024))[0, 1]) < 0.1
 
 
 def test_vpls_that_stay_keep_their_order_and_nearly_all_their_shares():
     """One that goes would change the share of every other, if they were dealt by number."""
-    slots, starts = np.arange(256), share_starts(255, 4)
-    before = dealt(slots, 256)
+    slots, starts = np.arange(256), find_share_starts(255, 4)
+    before = deal(slots, 256)
     for gone in (0, 100, 255):
         left = np.delete(slots, gone)
-        after = left[dealt(left, 256)]
+        after = left[deal(left, 256)]
         assert (after == before[before != gone]).all()
-        share = dict(zip(before.tolist(), np.repeat(np.arange(16), np.diff(share_starts(256, 4))), strict=True))
+        share = dict(zip(before.tolist(), np.repeat(np.arange(16), np.diff(find_share_starts(256, 4))), strict=True))
         now = np.repeat(np.arange(16), np.diff(starts))
         moved = sum(share[slot] != new for slot, new in zip(after.tolist(), now, strict=True))
         assert moved <= 15
@@ -55,7 +55,7 @@ def test_vpls_that_stay_keep_their_order_and_nearly_all_their_shares():
 @given(size=st.tuples(st.integers(1, 70), st.integers(1, 70)), n=st.sampled_from([1, 2, 4, 8]))
 def test_sub_buffers_hold_every_pixel_once(size, n):
     filled = np.zeros(size[::-1], int)
-    for share, (x, y, width, height) in enumerate(sub_buffers(size, n)):
+    for share, (x, y, width, height) in enumerate(find_sub_buffers(size, n)):
         filled[y : y + height, x : x + width] += 1
         assert width == len(range(share % n, size[0], n))
         assert height == len(range(share // n, size[1], n))
@@ -109,7 +109,7 @@ def gathered(scene, n, fewest, shares, gbuffer):
     seen = from_gbuffer(scene.camera, NEAR * scene.geometry.diagonal, depth, normals)
     for image, values in ((position, seen.position), (normal, seen.normal), (shading, seen.shading_normal)):
         image.reshape(-1, 3)[seen.pixel] = values
-    rectangles = sub_buffers((width, height), n)
+    rectangles = find_sub_buffers((width, height), n)
     result, thin = np.zeros((height, width, 3)), np.zeros((height, width), bool)
 
     def neighbour(x, y, i, j):

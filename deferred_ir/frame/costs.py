@@ -1,4 +1,4 @@
-"""What a VPL's shadows should cost, by a map or by rays: a rough model for plans, which are made before a frame runs."""
+"""A rough model of what a VPL's shadows cost, by a map or by rays: plans are made before a frame is measured."""
 
 from __future__ import annotations
 

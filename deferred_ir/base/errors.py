@@ -62,3 +62,9 @@ def shown(value: Any) -> str:
     except ValueError:  # Python writes no integers of more than 4300 digits
         return "a number of too many digits"
     return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def summarise(error: Exception) -> str:
+    """Return what an exception of another library says, on one line; its type if it says nothing."""
+    text = error.strerror if isinstance(error, OSError) else None
+    return " ".join((text or str(error)).split()) or type(error).__name__

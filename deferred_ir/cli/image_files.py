@@ -10,7 +10,8 @@ from deferred_ir.base.errors import OutputError
 from deferred_ir.base.files import check_folder
 from deferred_ir.cli.drawing import Picture
 from deferred_ir.engine.renderer import IMAGES
-from deferred_ir.output.image import Image, check_path
+from deferred_ir.output.find_format import check_path, find_format
+from deferred_ir.output.image import Image
 
 _NUMBER = re.compile(r"%0\d{1,2}d")
 
@@ -41,7 +42,7 @@ class ImageFiles:
 
         Frames are `averaged` in radiance, whatever the files show.
         """
-        names = {"display" if Path(name).suffix.lower() == ".png" else "radiance" for name in self.names}
+        names = {find_format(Path(name)).LAYER for name in self.names}
         missing = names - known.keys()
         if missing:
             which = f"'{min(missing)}', which these files need: {', '.join(self.names)}"

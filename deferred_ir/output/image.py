@@ -1,4 +1,4 @@
-"""A rendered image and the files it becomes."""
+"""A rendered image, and linear radiance read back from a file."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import OutputError, SettingError, did_you_mean
-from deferred_ir.base.files import check_folder, write_whole
+from deferred_ir.base.files import write_whole
+from deferred_ir.output.find_format import check_path, find_format, list_suffixes
 
 LARGEST = float(np.finfo(np.float32).max)
-SUFFIXES = (".png", ".npy", ".exr")
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,51 +31,37 @@ class Image:
         """Write `.png` (display pixels), `.npy` or `.exr` (float32 radiance); the file appears whole or not at all."""
         path = Path(path)
         check_path(path)
-        suffix = path.suffix.lower()
-        name = "display" if suffix == ".png" else "radiance"
-        pixels = getattr(self, name)
+        kind = find_format(path)
+        pixels = getattr(self, kind.LAYER)
         if pixels is None:
+            suffix = path.suffix.lower()
             raise OutputError(
-                f"{path}: this graph has no output '{name}', which {suffix} files hold; save another kind"
+                f"{path}: this graph has no output '{kind.LAYER}', which {suffix} files hold; save another kind"
             )
-        write = {".png": _png, ".npy": _npy, ".exr": _exr}[suffix]
-        write_whole(path, lambda part: write(part, pixels))
+        write_whole(path, lambda part: kind.write(part, pixels))
 
 
-def _png(path: Path, pixels: Any) -> None:
-    import PIL.Image
-
-    PIL.Image.fromarray(pixels).save(path, format="PNG")
-
-
-def _npy(path: Path, pixels: Any) -> None:
-    with path.open("wb") as file:
-        np.save(file, pixels)
-
-
-def _exr(path: Path, pixels: Any) -> None:
-    import OpenEXR
-
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+def read_radiance(path: Path) -> Array:
+    """Read linear radiance from an image file: float64 (H, W, 3), all finite. Raises SettingError."""
+    linear = list_suffixes("radiance")
+    if path.suffix.lower() not in list_suffixes():
+        raise SettingError(f"{path}: unknown kind of image '{path.suffix}'{did_you_mean(path.suffix, linear)}")
+    kind = find_format(path)
+    if kind.LAYER != "radiance":
+        raise SettingError(f"{path}: is tone-mapped; compare linear radiance, {' or '.join(linear)}")
+    if not os.path.isfile(path):  # unlike Path.is_file it does not raise for names that the system cannot have
+        raise SettingError(f"{path}: is {'no file' if os.path.exists(path) else 'missing'}")
     try:
-        with OpenEXR.File(header, {"RGB": np.ascontiguousarray(pixels, np.float32)}) as file:
-            file.write(str(path))
-    except RuntimeError as error:  # its word for a fault of the system's
-        raise OSError(str(error)) from error
+        pixels = kind.read(path)
+    except ValueError as error:
+        raise SettingError(f"{path}: {error}") from error
+    return check_radiance(pixels, str(path))
 
 
-def check_path(path: str | os.PathLike[str]) -> None:
-    """Raise OutputError if `path` cannot be a result: better before the work than after it."""
-    path = Path(path)
-    if path.suffix.lower() not in SUFFIXES and not os.path.isdir(path):
-        raise OutputError(f"{path}: unknown kind of image '{path.suffix}'{did_you_mean(path.suffix, SUFFIXES)}")
-    check_folder(path)
+def check_radiance(image: Any, name: str = "image") -> Array:
+    """Return `image` in double precision. Raises SettingError unless it is (H, W, 3) of finite 32-bit floats.
 
-
-def radiance(image: Any, name: str = "image") -> Array:
-    """`image` in double precision, or a SettingError if it is no (H, W, 3) array of finite 32-bit floats.
-
-    What is not finite is counted in pixels. Infinity in 32 bits counts as infinity: radiance is stored so.
+    The error counts the pixels that are not finite. Infinity in 32 bits counts as infinity: radiance is stored so.
     """
     array = np.asarray(image)
     if array.dtype.kind != "f":

@@ -22,7 +22,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools
 from deferred_ir.base.errors import SettingError
-from deferred_ir.output.image import radiance
+from deferred_ir.output.image import check_radiance
 from deferred_ir.truth import flip
 from deferred_ir.truth.flip import FlipParameters
 
@@ -166,7 +166,7 @@ def bias(image: Any, reference: Any, hit: Hit = None) -> float:
 
 
 def _pair(image: Any, reference: Any, hit: Hit, names: tuple[str, str]) -> _Pair:
-    first, second = radiance(image, names[0]), radiance(reference, names[1])
+    first, second = check_radiance(image, names[0]), check_radiance(reference, names[1])
     if first.shape != second.shape:
         sizes = [f"{array.shape[1]}x{array.shape[0]}" for array in (first, second)]
         raise SettingError(f"{names[0]}: is {sizes[0]}, but {names[1]} is {sizes[1]}; render it at --size {sizes[1]}")

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array
-from deferred_ir.output.read import read_radiance
+from deferred_ir.output.image import read_radiance
 from deferred_ir.profiling.peers.peer import Rendered
 from deferred_ir.scene.scene import Scene
 

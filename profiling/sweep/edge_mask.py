@@ -19,7 +19,7 @@ from deferred_ir.base.errors import SettingError
 from deferred_ir.base.files import write_json, write_whole
 from deferred_ir.base.progress import Progress
 from deferred_ir.output.image import Image
-from deferred_ir.output.read import read_record, record_path
+from deferred_ir.output.metadata import metadata_path, read_metadata
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 
@@ -158,7 +158,7 @@ def save(folder: Path, mask: Mask, scene_hash: str) -> None:
     def fill(part: Path) -> None:
         with part.open("wb") as file:
             np.save(file, mask.kept)
-        write_json(record_path(folder / FILE), record)
+        write_json(metadata_path(folder / FILE), record)
 
     write_whole(folder / FILE, fill)
 
@@ -169,7 +169,7 @@ def read(folder: Path, scene_hash: str, size: tuple[int, int]) -> Mask | None:
     try:
         with file.open("rb") as stream:
             kept = np.load(stream)
-        record = read_record(file, size)
+        record = read_metadata(file, size)
     except (OSError, ValueError, EOFError, SettingError):
         return None  # it is made again
     if kept.dtype != np.bool_ or kept.shape != (size[1], size[0]) or not (folder / PICTURE).is_file():

@@ -14,7 +14,8 @@ from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import SettingError
 from deferred_ir.base.files import write_json, write_whole
 from deferred_ir.base.progress import ProgressBar
-from deferred_ir.output.read import read_radiance, read_record, record_path
+from deferred_ir.output.image import read_radiance
+from deferred_ir.output.metadata import metadata_path, read_metadata
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.reference import reference
@@ -59,10 +60,10 @@ def given(path: Path, scene: Scene, size: tuple[int, int], time: float = 0.0) ->
         raise SettingError(
             f"{path}: is {width}x{height}, but the sweep is {size[0]}x{size[1]}; give --size {width}x{height}"
         )
-    record = read_record(path, size)
+    record = read_metadata(path, size)
     if not record:
         raise SettingError(
-            f"{path}: has no record {record_path(path).name} beside it; make it by: deferred-ir reference"
+            f"{path}: has no record {metadata_path(path).name} beside it; make it by: deferred-ir reference"
         )
     if record["scene_hash"] != scene.hash:
         raise SettingError(
@@ -138,7 +139,7 @@ def _save(folder: Path, truth: Truth) -> None:
     def fill(part: Path) -> None:
         with part.open("wb") as stream:
             np.save(stream, np.asarray(truth.radiance, np.float32))
-        write_json(record_path(file), {**truth.record, "image_hash": truth.hash})
+        write_json(metadata_path(file), {**truth.record, "image_hash": truth.hash})
 
     write_whole(file, fill)
 
@@ -148,7 +149,7 @@ def _kept(folder: Path, scene: Scene, size: tuple[int, int], bounces: int) -> Tr
     file = folder / FILE
     try:
         radiance = read_radiance(file)
-        record = read_record(file, size)
+        record = read_metadata(file, size)
     except SettingError:
         return None  # it is traced again
     truth = Truth(radiance, record)

@@ -10,12 +10,12 @@ from PIL import Image
 from deferred_ir.cli.main import main
 from deferred_ir.output import image as images
 
-RECORD = {"scene": "cornell", "scene_hash": "0123456789abcdef", "size": [32, 24]}
+METADATA = {"scene": "cornell", "scene_hash": "0123456789abcdef", "size": [32, 24]}
 
 
 @pytest.fixture
 def pair(tmp_path):
-    """Paths of an image and of its reference, as arrays and without records."""
+    """Paths of an image and of its reference, as arrays and without metadata."""
     rng = np.random.default_rng(0)
     reference = rng.gamma(1.0, 1.0, (24, 32, 3)).astype(np.float32)
     np.save(tmp_path / "b.npy", reference)
@@ -108,10 +108,10 @@ def test_what_is_no_image_is_one_line(pair, tmp_path, capsys, file, words):
 
 
 @pytest.mark.parametrize(
-    "record", ["{", '{"scene_hash": 3}', '{"scene_hash": "x", "size": [1, 1]}', '{"scene_hash": "x", "size": null}']
+    "metadata", ["{", '{"scene_hash": 3}', '{"scene_hash": "x", "size": [1, 1]}', '{"scene_hash": "x", "size": null}']
 )
-def test_a_record_that_does_not_fit_is_one_line(pair, tmp_path, capsys, record):
-    (tmp_path / "b.json").write_text(record)
+def test_metadata_that_do_not_fit_are_one_line(pair, tmp_path, capsys, metadata):
+    (tmp_path / "b.json").write_text(metadata)
     assert "b.json" in fault(capsys, *pair)
 
 
@@ -176,15 +176,15 @@ def test_names_that_are_no_files_are_one_line(pair, tmp_path, capsys, name):
 
 @pytest.mark.parametrize("fraction", ["-0.1", "1.5", "NaN", "true", '"half"', "[]"])
 def test_a_share_of_hits_that_cannot_be_is_one_line(pair, tmp_path, capsys, fraction):
-    text = json.dumps(RECORD)[:-1] + f', "hit_fraction": {fraction}}}'
+    text = json.dumps(METADATA)[:-1] + f', "hit_fraction": {fraction}}}'
     (tmp_path / "b.json").write_text(text)
     assert "b.json: hit_fraction: " in fault(capsys, *pair)
 
 
-def test_another_json_of_the_same_name_is_no_record(pair, tmp_path, capsys):
+def test_another_json_of_the_same_name_are_no_metadata(pair, tmp_path, capsys):
     (tmp_path / "b.json").write_text('{"some": "thing"}')
     assert main(["compare", *pair]) == 0
-    assert "no record b.json" in capsys.readouterr().err
+    assert "no metadata in b.json" in capsys.readouterr().err
 
 
 def test_what_the_counted_pixels_rest_on_is_told(pair, tmp_path, capsys):
@@ -195,7 +195,7 @@ def test_what_the_counted_pixels_rest_on_is_told(pair, tmp_path, capsys):
     assert main(["compare", *pair]) == 0
     assert "384 pixels, black in both images, are taken for background" in capsys.readouterr().err
     for name in "ab":
-        (tmp_path / f"{name}.json").write_text(json.dumps(RECORD | {"hit_fraction": 0.5}))
+        (tmp_path / f"{name}.json").write_text(json.dumps(METADATA | {"hit_fraction": 0.5}))
     assert main(["compare", *pair]) == 0
     assert capsys.readouterr().err == ""
     arrays[0][11] = 1

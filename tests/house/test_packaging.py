@@ -91,7 +91,7 @@ def test_the_installed_package_renders_from_another_folder(python, tmp_path):
     ("script", "extra"),
     [
         ("import deferred_ir", {"numpy"}),
-        ("from deferred_ir.cli.main import main\ntry: main(['--help'])\nexcept SystemExit: pass", set()),
+        ("from deferred_ir.cli.main import main\ntry: main(['--help'])\nexcept SystemExit: pass", {"numpy"}),
     ],
     ids=["import", "help"],
 )

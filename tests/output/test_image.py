@@ -12,7 +12,8 @@ import pytest
 
 from deferred_ir.base.errors import OutputError
 from deferred_ir.base.files import write_whole
-from deferred_ir.output.image import Image, check_path
+from deferred_ir.output.find_format import check_path, find_format, list_suffixes
+from deferred_ir.output.image import Image
 
 RNG = np.random.default_rng(0)
 RADIANCE = (RNG.random((5, 7, 3)) * 10.0 ** RNG.integers(-6, 6, (5, 7, 3))).astype(np.float32)
@@ -37,6 +38,20 @@ def test_what_is_saved_is_read_back_exactly(tmp_path, suffix):
     assert found.dtype == EXPECTED[suffix].dtype
     np.testing.assert_array_equal(found, EXPECTED[suffix])
     assert os.listdir(tmp_path) == [path.name]
+
+
+@pytest.mark.parametrize("suffix", list_suffixes())
+def test_every_format_reads_what_it_writes(tmp_path, suffix):
+    path = tmp_path / f"image{suffix.upper()}"
+    IMAGE.save(path)
+    found = find_format(path)
+    np.testing.assert_array_equal(found.read(path), getattr(IMAGE, found.LAYER))
+
+
+def test_every_format_says_what_it_holds():
+    assert set(list_suffixes()) == set(READERS)
+    assert list_suffixes("display") == [".png"]
+    assert list_suffixes("radiance") == [".exr", ".npy"]
 
 
 def test_exr_is_32_bit_float(tmp_path):

@@ -23,7 +23,9 @@ ORDER = 30
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of `deferred-ir compare`."""
     parser.add_argument("image", metavar="A", help="linear image: .npy or .exr")
-    parser.add_argument("reference", metavar="B", help="the reference, likewise; its record is B.json, if there is one")
+    parser.add_argument(
+        "reference", metavar="B", help="the reference, likewise; B.json beside it says what it shows, if it is there"
+    )
     parser.add_argument("--json", metavar="F", help="write all figures")
     diff = "write where the image is too dark (blue) or too bright (red)"
     parser.add_argument("--diff", metavar="OUT.png", help=diff)
@@ -42,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     image, reference = _read(image_path), _read(reference_path)
     _check_same_scene(image, reference)
     _check_same_time(image, reference)
-    hit = reference.record.get("hit_fraction") or None
+    hit = reference.metadata.get("hit_fraction") or None
     result = compare(image.radiance, reference.radiance, hit, names=(str(image_path), str(reference_path)))
     print_notes(_list_notes(result, image, reference))
     if diff:
@@ -50,25 +52,26 @@ def run(arguments: argparse.Namespace) -> int:
         error_picture.save(diff, error)
     if json:
         names = {"image": str(image_path), "reference": str(reference_path)}
-        write_json(json, {**names, "scene_hash": reference.record.get("scene_hash"), **result.as_dict()})
+        write_json(json, {**names, "scene_hash": reference.metadata.get("scene_hash"), **result.as_dict()})
     print(format_table(result))
     return 0
 
 
 @dataclass(frozen=True)
 class _Input:
-    """An image that is compared, and the record beside it, empty if there is none."""
+    """An image that is compared, and its metadata, empty if there are none."""
 
     path: Path
     radiance: Array
-    record: dict[str, Any]
+    metadata: dict[str, Any]
 
 
 def _read(path: Path) -> _Input:
-    from deferred_ir.output.read import read_radiance, read_record
+    from deferred_ir.output.image import read_radiance
+    from deferred_ir.output.metadata import read_metadata
 
     radiance = read_radiance(path)
-    return _Input(path, radiance, read_record(path, (radiance.shape[1], radiance.shape[0])))
+    return _Input(path, radiance, read_metadata(path, (radiance.shape[1], radiance.shape[0])))
 
 
 def format_table(result: Comparison) -> str:
@@ -93,35 +96,37 @@ def format_table(result: Comparison) -> str:
 def _check_outputs(image: Path, reference: Path, json: Path | None, diff: Path | None) -> None:
     """Raise OutputError, before the work, if an output cannot be written or would replace an input."""
     from deferred_ir.base.files import check_folder
-    from deferred_ir.output.read import record_path
+    from deferred_ir.output.find_format import list_suffixes
+    from deferred_ir.output.metadata import metadata_path
 
-    if diff and diff.suffix.lower() != ".png":
-        raise OutputError(f"{diff}: the difference is a picture; name a .png")
-    inputs = {os.path.realpath(file) for path in (image, reference) for file in (path, record_path(path))}
+    pictures = list_suffixes("display")
+    if diff and diff.suffix.lower() not in pictures:
+        raise OutputError(f"{diff}: the difference is a picture; name a {' or '.join(pictures)}")
+    inputs = {os.path.realpath(file) for path in (image, reference) for file in (path, metadata_path(path))}
     for output in (json, diff):
         if output is None:
             continue
         check_folder(output)
         if os.path.realpath(output) in inputs:
-            raise OutputError(f"{output}: is an image that is compared, or its record; choose another name")
+            raise OutputError(f"{output}: is an image that is compared, or lies beside one; choose another name")
 
 
 def _check_same_scene(image: _Input, reference: _Input) -> None:
-    """Raise SettingError if the records say that the images show different scenes."""
-    records = image.record, reference.record
-    if all(records) and records[0]["scene_hash"] != records[1]["scene_hash"]:
-        names = [f"{shown(record.get('scene'))} ({shown(record['scene_hash'])})" for record in records]
+    """Raise SettingError if the metadata say that the images show different scenes."""
+    both = image.metadata, reference.metadata
+    if all(both) and both[0]["scene_hash"] != both[1]["scene_hash"]:
+        names = [f"{shown(one.get('scene'))} ({shown(one['scene_hash'])})" for one in both]
         raise SettingError(
             f"{image.path}: shows the scene {names[0]}, but {reference.path} shows {names[1]}; compare like with like"
         )
 
 
 def _check_same_time(image: _Input, reference: _Input) -> None:
-    """Raise SettingError if the records give different times of a scene that moves.
+    """Raise SettingError if the metadata give different times of a scene that moves.
 
-    Records of still scenes say 0; those of other programs may leave the time out, and are not checked.
+    Metadata of still scenes say 0; those of other programs may leave the time out, and are not checked.
     """
-    now, then = image.record.get("time"), reference.record.get("time")
+    now, then = image.metadata.get("time"), reference.metadata.get("time")
     if isinstance(now, int | float) and isinstance(then, int | float) and abs(now - then) > 1e-3:
         raise SettingError(
             f"{image.path}: shows the scene at {now:.4f} s, but {reference.path} shows it at {then:.4f} s; trace a "
@@ -131,16 +136,16 @@ def _check_same_time(image: _Input, reference: _Input) -> None:
 
 def _list_notes(result: Comparison, image: _Input, reference: _Input) -> Iterator[str]:
     """Yield what was not checked, and what the figures take for background."""
-    from deferred_ir.output.read import record_path
+    from deferred_ir.output.metadata import metadata_path
 
-    missing = [one.path for one in (reference, image) if not one.record]
+    missing = [one.path for one in (reference, image) if not one.metadata]
     if missing:
-        name = record_path(missing[0]).name
-        yield f"{missing[0]}: no record {name} beside it, so whether both show the same scene is not checked"
+        name = metadata_path(missing[0]).name
+        yield f"{missing[0]}: no metadata in {name} beside it, so whether both show the same scene is not checked"
     size = result.size[0] * result.size[1]
     if result.pixels_by == "lit" and result.pixels < size:
         yield f"{size - result.pixels} pixels, black in both images, are taken for background"
     elif result.pixels_by == "hit fraction":
-        extra = result.pixels - round(reference.record["hit_fraction"] * size)
+        extra = result.pixels - round(reference.metadata["hit_fraction"] * size)
         if extra > 0:
             yield f"{image.path}: is lit in {extra} pixels more than the reference's camera rays hit"

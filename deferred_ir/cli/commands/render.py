@@ -19,6 +19,7 @@ from deferred_ir.cli.options import (
     parse_positive,
     print_notes,
 )
+from deferred_ir.output.find_format import list_suffixes
 
 if TYPE_CHECKING:
     from deferred_ir.cli.drawing import Drawing
@@ -33,7 +34,7 @@ ORDER = 10
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of `deferred-ir render`."""
     parser.add_argument("scene", metavar="SCENE", help=SCENE)
-    output = "image: .png, .exr or .npy (%%04d: the frame); may be repeated"
+    output = f"image: {', '.join(list_suffixes())} (%%04d: the frame); may be repeated"
     parser.add_argument("-o", "--output", action="append", default=[], metavar="OUT", help=output)
     add_graph(parser)
     add_size(parser)

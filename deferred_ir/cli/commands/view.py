@@ -82,12 +82,13 @@ def _check_screenshot(arguments: argparse.Namespace) -> Path | None:
     """Return where the screenshot goes, None if none is wanted. Raises an Error if it could not be written."""
     if arguments.screenshot is None:
         return None
-    from deferred_ir.output.image import check_path
+    from deferred_ir.output.find_format import check_path, list_suffixes
 
     screenshot = Path(arguments.screenshot)
     if arguments.frames is None:
         raise SettingError("--screenshot: wants --frames N, the frame to write")
-    if screenshot.suffix.lower() != ".png":
-        raise OutputError(f"{screenshot}: a screenshot is written as .png; name a .png")
+    pictures = " or ".join(list_suffixes("display"))
+    if screenshot.suffix.lower() not in list_suffixes("display"):
+        raise OutputError(f"{screenshot}: a screenshot is written as {pictures}; name a {pictures}")
     check_path(screenshot)
     return screenshot

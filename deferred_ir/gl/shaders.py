@@ -25,6 +25,7 @@ STAGES = {
 }
 """moderngl's name of the stage that a file is, by its suffix."""
 FULLSCREEN = "fullscreen.vert"
+_WORD = re.compile(r"[A-Za-z_]\w*")
 _SUFFIXES = {*STAGES, ".glsl"}
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 _MESSAGE = re.compile(r"^(?:ERROR: )?\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*(.*)$", re.MULTILINE)  # Mesa, NVIDIA, AMD, Intel
@@ -37,22 +38,32 @@ _SAMPLERS = {
 
 @dataclass(frozen=True)
 class Source:
-    """A flattened shader: its text, and for each line the file and line that it came from."""
+    """A flattened shader: its text, for each line the file and line that it came from, and the words in its files."""
 
     text: str
     lines: tuple[tuple[str, int], ...]
+    words: frozenset[str] = frozenset()
+
+
+Files = tuple[tuple[str, ...], Path | None]
+"""A program's files, one a stage, and the folder searched before the package's."""
+Key = tuple[tuple[str, ...], Path | None, tuple[tuple[str, int | float], ...]]
+"""A program's files, the folder, and those of its defines that the files name."""
 
 
 def package_shaders() -> Path:
-    """The folder with the package's own shaders."""
+    """Return the folder with the package's own shaders."""
     return Path(importlib.import_module("deferred_ir.shaders").__path__[0])
 
 
 def flatten(name: str, folders: Iterable[Path], defines: Mapping[str, int | float]) -> Source:
-    """The shader file `name`, looked for in `folders` in order, with its includes (each once) and defines."""
+    """Read the shader file `name`, looked for in `folders` in order, with its includes, each once.
+
+    Of `defines` it gets those that its text names.
+    """
     search = tuple(folders)
-    out = [VERSION, *(f"#define {key} {value}" for key, value in sorted(defines.items()))]
-    lines: list[tuple[str, int]] = [("defines", i + 1) for i in range(len(out))]
+    body: list[str] = []
+    lines: list[tuple[str, int]] = []
     seen: set[str] = set()
 
     def add(file: str, included_by: str) -> None:
@@ -64,13 +75,16 @@ def flatten(name: str, folders: Iterable[Path], defines: Mapping[str, int | floa
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
             include = _INCLUDE.match(line)
             if include is None:
-                out.append(line)
+                body.append(line)
                 lines.append((file, number))
             elif include[1] not in seen:
                 add(include[1], f"{file}:{number}")
 
     add(name, name)
-    return Source("\n".join(out) + "\n", tuple(lines))
+    words = frozenset(word for line in body for word in _WORD.findall(line))
+    head = [VERSION, *(f"#define {key} {defines[key]}" for key in sorted(words & defines.keys()))]
+    places = [("defines", i + 1) for i in range(len(head))]
+    return Source("\n".join([*head, *body]) + "\n", (*places, *lines), words)
 
 
 class Program:
@@ -114,57 +128,72 @@ class Program:
 
 
 class ShaderLibrary:
-    """Programs by their files and defines. `compiled` counts the programs built so far."""
+    """Programs by their files and the defines that these name. `compiled` counts the programs built so far."""
 
     def __init__(self, gpu: Gpu) -> None:
         self.gpu = gpu
         self.compiled = 0
-        self._programs: dict[Any, Program] = {}
+        self._programs: dict[Key, Program] = {}
+        self._defines: dict[Key, dict[str, int | float]] = {}  # with those that the files may name once they change
+        self._words: dict[Files, frozenset[str]] = {}
 
     def program(
         self, *files: str, defines: Mapping[str, int | float] | None = None, folder: Path | None = None
     ) -> Program:
-        """The program of these files with these defines, one a stage; without a .vert it covers the whole target.
+        """Return the program of these files, one a stage; without a .vert it covers the whole target.
 
-        `folder` is searched before the package's shaders.
+        `defines` make a difference where a file names them. `folder` is searched before the package's shaders.
         """
-        all_defines = {**self.gpu.defines, **(defines or {})}
-        key = (files, folder, tuple(sorted(all_defines.items())))
-        if key not in self._programs:
-            self._programs[key] = self._build(files, all_defines, folder)
+        asked = {**self.gpu.defines, **(defines or {})}
+        words = self._words.get((files, folder))
+        key = None if words is None else _key(files, folder, asked, words)
+        if key is None or key not in self._programs:
+            sources = _sources(files, asked, folder)
+            program = self._build(files[0], sources)
+            words = _words(sources)
+            key = _key(files, folder, asked, words)
+            self._words[files, folder], self._programs[key], self._defines[key] = words, program, asked
         return self._programs[key]
 
-    def _build(self, files: tuple[str, ...], defines: Mapping[str, Any], folder: Path | None) -> Program:
+    def _build(self, name: str, sources: Mapping[str, Source]) -> Program:
         import moderngl
 
-        sources = _sources(files, defines, folder)
         texts: dict[str, Any] = {stage: source.text for stage, source in sources.items()}
         self.compiled += 1
         try:
             glsl = self.gpu.ctx.program(**texts)
         except moderngl.Error as error:
-            raise ShaderError(_locate(str(error), sources, files[0])) from error
-        return Program(self.gpu, files[0], glsl, sources.values())
+            raise ShaderError(_locate(str(error), sources, name)) from error
+        return Program(self.gpu, name, glsl, sources.values())
 
     def reload(self) -> bool:
-        """Build the programs again whose files have changed, all or none; whether there were any.
+        """Build the programs again whose files have changed, all or none. Returns whether there were any.
 
         After a ShaderError the programs are those from before.
         """
-        fresh: dict[Any, Program] = {}
+        programs: dict[Key, Program] = {}
+        defines: dict[Key, dict[str, int | float]] = {}
+        words: dict[Files, frozenset[str]] = {}
+        before = set(self._programs.values())
         try:
-            for key, program in self._programs.items():
-                files, folder, defines = key
-                sources = _sources(files, dict(defines), folder)
-                if "".join(source.text for source in sources.values()) != program.text:
-                    fresh[key] = self._build(files, dict(defines), folder)
+            for old, program in self._programs.items():
+                (files, folder, _), asked = old, self._defines[old]
+                sources = _sources(files, asked, folder)
+                words[files, folder] = _words(sources)
+                key = _key(files, folder, asked, words[files, folder])
+                if key in programs:
+                    continue  # the files no longer name what told the two apart
+                changed = "".join(source.text for source in sources.values()) != program.text
+                programs[key] = self._build(files[0], sources) if changed else program
+                defines[key] = asked
         except ShaderError:
-            for program in fresh.values():
+            for program in set(programs.values()) - before:
                 program.release()
             raise
-        for key, program in fresh.items():
-            self._programs[key].release()
-            self._programs[key] = program
+        fresh = set(programs.values()) - before
+        for program in before - set(programs.values()):
+            program.release()
+        self._programs, self._defines, self._words = programs, defines, words
         return bool(fresh)
 
     def forget(self, key: Any) -> None:
@@ -185,6 +214,15 @@ def _sources(files: Iterable[str], defines: Mapping[str, Any], folder: Path | No
     folders = [package_shaders()] if folder is None else [folder, package_shaders()]
     stages = {"vertex_shader": FULLSCREEN, **{STAGES[Path(file).suffix]: file for file in files}}
     return {stage: flatten(file, folders, defines) for stage, file in stages.items()}
+
+
+def _words(sources: Mapping[str, Source]) -> frozenset[str]:
+    """All words in the files of a program."""
+    return frozenset().union(*(source.words for source in sources.values()))
+
+
+def _key(files: tuple[str, ...], folder: Path | None, defines: Mapping[str, int | float], words: frozenset[str]) -> Key:
+    return files, folder, tuple((name, defines[name]) for name in sorted(words & defines.keys()))
 
 
 def _locate(message: str, sources: Mapping[str, Source], name: str) -> str:

@@ -159,6 +159,36 @@ def test_each_change_costs_what_it_must(renderer, monkeypatch):
     assert work.of(BRIGHTER, exposed) == (1, 1, {})
 
 
+def warmed_up(one):
+    """The renderer at rest, with the variants of programs that it has where parts of a frame stay."""
+    drawn(settled(one), LIGHT)
+    return settled(one)
+
+
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_a_define_compiles_the_programs_that_name_it(renderer, graph):
+    """The size of VPLs' maps stands in their readers' programs, and in none of the others."""
+    one = warmed_up(renderer(SIZE, graph, set=SETTINGS, reuse=True))
+    library = one.executor.library
+    before = set(library._programs.values())
+    one.configure(set={**SETTINGS, "shadow_maps.vpl_size": 32})
+    drawn(one, ROOM)
+    naming = {program for program in library._programs.values() if "#define VPL_SIZE 32\n" in program.text}
+    assert set(library._programs.values()) - before == naming
+    one.configure(set=SETTINGS)
+    settled(one)
+    assert library.compiled == len(library._programs)
+
+
+def test_a_parameter_that_no_program_names_compiles_nothing(renderer):
+    one = warmed_up(renderer(SIZE, "accurate", set=SETTINGS, reuse=True))
+    compiled = one.executor.library.compiled
+    for change in ({"vpl.bounces": 2}, {"vpl.clamp": 0.1}, {"shadow_maps.bend": 1.0}, {"near_field.samples": 2.0}):
+        one.configure(set={**SETTINGS, **change})
+        assert drawn(one, ROOM)
+        assert one.executor.library.compiled == compiled
+
+
 def changes():
     """(scene, options, settings) of frames one after the other."""
     more = {**SETTINGS, "tonemap.exposure": 2.0}

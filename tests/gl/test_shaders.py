@@ -48,11 +48,18 @@ def fault(library: ShaderLibrary, folder: Path, text: str) -> str:
 
 
 def test_version_defines_and_text_follow_one_another(folder):
-    write(folder, "a.frag", "one\ntwo\n")
+    write(folder, "a.frag", "SIZE\nEDGE\n")
     source = flatten("a.frag", [folder], {"SIZE": 4, "EDGE": 0.5})
-    assert source.text == "#version 430 core\n#define EDGE 0.5\n#define SIZE 4\none\ntwo\n"
+    assert source.text == "#version 430 core\n#define EDGE 0.5\n#define SIZE 4\nSIZE\nEDGE\n"
     assert source.lines[-2:] == (("a.frag", 1), ("a.frag", 2))
     assert len(source.lines) == len(source.text.splitlines())
+
+
+def test_only_defines_that_the_text_names_are_written(folder):
+    write(folder, "a.frag", '#include "lib/b.glsl"\n#ifdef ASKED\nTHERE_AND_MORE\n#endif\n')
+    write(folder, "lib/b.glsl", "INCLUDED + 1\n")
+    source = flatten("a.frag", [folder], dict.fromkeys(("ASKED", "INCLUDED", "THERE", "MORE", "FOREIGN"), 1))
+    assert [line for line in source.text.splitlines() if "#define" in line] == ["#define ASKED 1", "#define INCLUDED 1"]
 
 
 def test_includes_are_replaced_once_at_any_depth(folder):
@@ -112,6 +119,34 @@ def test_programs_are_kept_by_files_and_defines(library, folder):
     assert library.compiled == 1
     assert program(library, folder, text, SIZE=2) is not first
     assert library.compiled == 2
+
+
+def test_a_define_that_no_stage_names_compiles_nothing(library, folder):
+    write(folder, "placed.vert", "void main() { gl_Position = vec4(PLACE); }\n")
+    write(folder, "own.frag", "out vec4 color;\nvoid main() {\n#ifdef BRIGHT\ncolor = vec4(1.0);\n#endif\n}\n")
+
+    def made(**defines: int) -> Program:
+        return library.program("own.frag", "placed.vert", defines=defines, folder=folder)
+
+    first = made(PLACE=1, FOREIGN=1)
+    assert made(PLACE=1, FOREIGN=2) is made(PLACE=1) is first
+    assert library.compiled == 1
+    made(PLACE=2)
+    made(PLACE=2, BRIGHT=1)
+    assert library.compiled == 3
+
+
+def test_a_define_that_an_edited_file_names_from_now_on_is_written(library, folder):
+    first = program(library, folder, "out vec4 color; void main() { color = vec4(1.0); }", SIZE=1)
+    other = program(library, folder, "out vec4 color; void main() { color = vec4(1.0); }", SIZE=2)
+    assert first is other
+    write(folder, "own.frag", "out vec4 color; void main() { color = vec4(SIZE); }")
+    assert library.reload()
+    assert not library.reload()
+    compiled = library.compiled
+    changed = [library.program("own.frag", "none.vert", defines={"SIZE": size}, folder=folder) for size in (1, 2)]
+    assert ["#define SIZE 1" in one.text for one in changed] == [True, False]
+    assert library.compiled == compiled + 1
 
 
 def test_every_shader_knows_what_the_driver_can_do(library, folder):

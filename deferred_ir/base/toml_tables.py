@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Mapping
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, NoReturn
 
 from deferred_ir.base.arrays import Vec3
-from deferred_ir.base.errors import SceneError, did_you_mean, shown
+from deferred_ir.base.errors import Error, SceneError, did_you_mean, shown
 
 LARGEST = 1e18
 """Larger numbers are refused: their squares would overflow 32-bit floats."""
@@ -21,8 +23,21 @@ DEEPEST = 32
 """Most levels of tables and arrays in a file; Python's own functions on nested values end at some hundreds."""
 
 
-def too_deep(value: Any) -> bool:
-    """Whether tables and arrays in `value` are nested beyond DEEPEST."""
+def read_toml(path: Path, name: str, error: type[Error]) -> dict[str, Any]:
+    """Read a TOML file. Raises `error`, one line that begins with `name`, where there is no file or no TOML in it."""
+    try:
+        data = tomllib.loads(path.read_bytes().decode())
+    except OSError as fault:
+        raise error(f"{name}: cannot be read: {fault.strerror or fault}") from fault
+    except (ValueError, RecursionError) as fault:  # bad TOML, bad UTF-8, nested beyond reason
+        raise error(f"{name}: not a TOML file: {' '.join(str(fault).split())}") from fault
+    if _is_too_deep(data):
+        raise error(f"{name}: tables and arrays nested deeper than {DEEPEST}; flatten them")
+    return data
+
+
+def _is_too_deep(value: Any) -> bool:
+    """Return whether tables and arrays in `value` are nested beyond DEEPEST."""
     level = [value]
     for _ in range(DEEPEST):
         tables = [item.values() for item in level if isinstance(item, dict)]

@@ -15,7 +15,7 @@ from deferred_ir.base.errors import GraphError
 from deferred_ir.engine.record import Record
 from deferred_ir.graph.graph import Plan
 from deferred_ir.output.image import Image
-from deferred_ir.sampling.patterns import frame_seed
+from deferred_ir.sampling.streams import frame_seed
 from deferred_ir.scene.scene import Scene
 
 if TYPE_CHECKING:

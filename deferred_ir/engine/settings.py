@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from deferred_ir.base.errors import SettingError
+from deferred_ir.base.image_size import parse_size
 from deferred_ir.graph.params import read_value
-from deferred_ir.loading.scene_file import parse_size
 from deferred_ir.scene.scene import RenderDefaults, Scene
 
 DEFAULT_GRAPH = "deferred"

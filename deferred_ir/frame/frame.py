@@ -12,8 +12,16 @@ from deferred_ir.frame.scene_buffers import SceneBuffers
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.rays.pixel_surfaces import Surfaces, from_gbuffer
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.scene.lights.spot import NEAR
 from deferred_ir.scene.scene import Scene
+
+NEAR = 1e-8
+"""Near planes of camera and lights, as a fraction of the scene's scale: what is nearer is cut away.
+
+Walls so close to a light that they are cut let light through. A light's own surface, which roundings put a little
+before or behind it, is kept out of its map by lifting the light off instead (frame/light_buffer.off_surface,
+lib/shadows/projection.glsl). Depths, near / distance in 32-bit floats, have the same relative precision whatever the
+near plane.
+"""
 
 FRAME = np.dtype(
     [

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.base.colour import srgb_table
 from deferred_ir.base.errors import DeviceError
 from deferred_ir.frame.cluster_buffers import ClusterBuffers
 from deferred_ir.gl.context import Gpu
@@ -18,7 +19,6 @@ from deferred_ir.graph.ports import Texture
 from deferred_ir.meshes.clusters import Clusters
 from deferred_ir.meshes.posed import MapMesh, PosedMesh
 from deferred_ir.scene.geometry import Geometry
-from deferred_ir.scene.materials import srgb_table
 from deferred_ir.scene.scene import Scene
 
 FACES, MATERIALS = 0, 1

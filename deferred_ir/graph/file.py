@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.errors import GraphError, did_you_mean, shown
-from deferred_ir.base.toml_tables import DEEPEST, too_deep
+from deferred_ir.base.toml_tables import read_toml
 from deferred_ir.graph import former_names, params
 from deferred_ir.graph.graph import Graph, Node
 from deferred_ir.graph.pass_base import Pass
@@ -114,14 +114,7 @@ def _read(path: Path, above: tuple[Path, ...], passes: Mapping[str, type[Pass]])
         raise GraphError(
             f"{path.name}: extends itself; remove 'extends' from one of: {', '.join(p.name for p in above)}"
         )
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise GraphError(f"{path.name}: cannot be read: {error}") from error
-    except (ValueError, RecursionError) as error:  # bad TOML, or too long or too deeply nested for Python
-        raise GraphError(f"{path.name}: not TOML: {error}") from error
-    if too_deep(table):
-        raise GraphError(f"{path.name}: tables and arrays nested deeper than {DEEPEST}; flatten them")
+    table = read_toml(path, path.name, GraphError)
     if not isinstance(table.get("passes", {}), dict):
         raise GraphError(f"{path.name}: passes: wants a table [passes.NAME] for each pass")
     if "extends" not in table:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from deferred_ir.base.errors import SceneError, did_you_mean
 from deferred_ir.loading import default_views, merge, models, scene_file
-from deferred_ir.loading.models import ModelData
+from deferred_ir.loading.model_data import ModelData
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight

@@ -8,7 +8,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import SceneError
-from deferred_ir.loading.models import ModelData, Part
+from deferred_ir.loading.model_data import ModelData, Part
 from deferred_ir.scene.geometry import Geometry, Model
 from deferred_ir.scene.motion import ModelMotion
 from deferred_ir.scene.scene import Material, Texture

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import io
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from deferred_ir.base.arrays import Array, Ints, Vec3
+from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.base.colour import linear_from_srgb
 from deferred_ir.base.errors import SceneError
 from deferred_ir.base.toml_tables import LARGEST
 from deferred_ir.loading import gltf, obj
 from deferred_ir.loading.asset_paths import Assets
-from deferred_ir.scene.materials import GREY, checked_albedo, linear_from_srgb, texture_from_image
+from deferred_ir.loading.model_data import GREY, ModelData, Part, check_albedo
+from deferred_ir.loading.textures import decode_texture
 from deferred_ir.scene.scene import Material, Texture
 
 ARCHIVES = ("zip", "gz", "bz2")
@@ -26,28 +27,6 @@ MOST_TEXELS = 1 << 28
 
 FAR_UVS = 16.0
 """Texture coordinates about a point farther out than this are moved home."""
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """One mesh of a file, placed in the world: arrays as in `Geometry`, of one material; uvs only with a texture."""
-
-    positions: Array
-    faces: Ints
-    material: Material
-    texture: Texture | None
-    normals: Array | None
-    uvs: Array | None
-    colors: Array | None
-
-
-@dataclass(frozen=True, eq=False)
-class ModelData:
-    """What one model file holds: its parts in a fixed order, and notes on what is not honoured."""
-
-    name: str
-    parts: tuple[Part, ...]
-    notes: tuple[str, ...]
 
 
 def read(path: Path, scale: float = 1.0, translate: Vec3 = (0.0, 0.0, 0.0), root: Path | None = None) -> ModelData:
@@ -193,7 +172,7 @@ class _Reader:
             self.texels += image.width * image.height
             if self.texels > MOST_TEXELS:
                 raise SceneError(f"{self.path}: its images have more than {MOST_TEXELS} pixels; scale them down")
-            texture = texture_from_image(image, image_name, self.notes)
+            texture = decode_texture(image, image_name, self.notes)
             self.textures[id(image)] = texture
         return Material(name, albedo), texture, colors, uvs
 
@@ -205,14 +184,14 @@ class _Reader:
             image = source.baseColorTexture
             if base.image is not None and image is None:
                 raise SceneError(f"{where}: image {base.image} is missing or not readable; put it next to the model")
-            return base.name, checked_albedo(base.factor, where, self.notes), image, base.image or ""
+            return base.name, check_albedo(base.factor, where, self.notes), image, base.image or ""
         plain = (1.0, 1.0, 1.0) if colored else GREY
         if source is None:
             return "default", plain, None, ""
         where = f"{self.path}: material {source.name}"
         if hasattr(source, "baseColorFactor"):  # formats that trimesh turns into PBR materials: 8 bits are what it has
             factor = source.baseColorFactor
-            albedo = plain if factor is None else checked_albedo(np.divide(factor[:3], 255), where, self.notes)
+            albedo = plain if factor is None else check_albedo(np.divide(factor[:3], 255), where, self.notes)
             return source.name, albedo, source.baseColorTexture, f"texture of {source.name}"
         return self._simple_reflectance(source, where, plain)
 
@@ -230,7 +209,7 @@ class _Reader:
             self.notes.append(f"{self.path.name}: material {source.name} has no Kd that can be read; it is grey")
         if material.emits:
             self.notes.append(f"{self.path.name}: emission (Ke) is ignored")
-        albedo = checked_albedo(material.kd, where, self.notes) if material.kd else plain
+        albedo = check_albedo(material.kd, where, self.notes) if material.kd else plain
         return source.name, albedo, image, wanted or f"texture of {source.name}"
 
     def _ply_image(self) -> str:

@@ -7,21 +7,20 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.arrays import Vec3
 from deferred_ir.base.errors import SceneError, did_you_mean, shown
-from deferred_ir.base.toml_tables import DEEPEST, Faults, Table, too_deep
+from deferred_ir.base.image_size import parse_size
+from deferred_ir.base.toml_tables import Faults, Table, read_toml
 from deferred_ir.scene.camera import Camera, view_fault
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.motion import CameraMotion, KeyframedSpotlight, LissajousMotion, ModelMotion, SpotlightMotion
 from deferred_ir.scene.scene import RenderDefaults
 
 KINDS = ("lissajous", "keyframes")
-SIZE = re.compile(r"\s*(\d{1,9})\s*[xX]\s*(\d{1,9})\s*")
 NAME = re.compile(r"[^/\\%\x00-\x1f\x7f]{1,100}")
 
 
@@ -49,14 +48,7 @@ class SceneFile:
 def read(path: Path) -> SceneFile:
     """Read and check a scene file. Raises SceneError: one line with all faults, each with its key and the mend."""
     faults = Faults(str(path))
-    try:
-        data = tomllib.loads(path.read_bytes().decode())
-    except OSError as error:
-        raise SceneError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, RecursionError) as error:  # bad TOML, bad UTF-8, nested beyond reason
-        raise SceneError(f"{path}: not a TOML file: {' '.join(str(error).split())}") from error
-    if too_deep(data):
-        raise SceneError(f"{path}: tables and arrays nested deeper than {DEEPEST}; flatten them")
+    data = read_toml(path, str(path), SceneError)
     root = Table(faults, "", data, ("name", "model", "camera", "spotlight", "render"))
     name = root.string("name")
     if name and not NAME.fullmatch(name):
@@ -66,14 +58,6 @@ def read(path: Path) -> SceneFile:
     if faults.found:
         faults.fail()
     return SceneFile(name or path.stem, models, camera, spotlight, render)
-
-
-def parse_size(text: str) -> tuple[int, int] | None:
-    """(width, height) of a string such as "512x512"; None if it is none, or 0."""
-    match = SIZE.fullmatch(text)
-    if match is None or not (int(match[1]) and int(match[2])):
-        return None
-    return int(match[1]), int(match[2])
 
 
 def _models(root: Table, folder: Path) -> tuple[ModelEntry, ...]:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.scene.lights.spot import frames
+from deferred_ir.sampling.warps import build_basis
 
 STEEPEST = 0.1
 """Least cosine between the normal of a star and those of its triangles: sharper tips and folds stay."""
@@ -217,7 +217,7 @@ class _Mesh:
         gap = np.zeros(len(u))
         if not len(u):
             return gap
-        x, y = frames(normal[u])
+        x, y = build_basis(normal[u])
         basis = np.stack([x, y, normal[u]], axis=1)
         rows, whose = stars.of(u)
         _, a, b = stars.corners[rows].T

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from deferred_ir.base.colour import LUMINANCE
+
 GRID = 64
 MIDDLE_GREY = 0.18
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def automatic_stops(radiance: Any) -> float:

@@ -10,9 +10,9 @@ from deferred_ir.base.arrays import Array
 from deferred_ir.base.parallel import in_order
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
-from deferred_ir.sampling import pixel_blocks
-from deferred_ir.sampling.patterns import disc
-from deferred_ir.scene.lights.spot import Spotlight, frames
+from deferred_ir.sampling import pixel_blocks, streams
+from deferred_ir.sampling.warps import build_basis, square_to_disc
+from deferred_ir.scene.lights.spot import Spotlight
 
 PIXELS = 1 << 13
 """Pixels of a task: few enough for their arrays to stay in a core's cache."""
@@ -25,7 +25,7 @@ def lit_by(light: Spotlight, tracer: Tracer, at: Hits, rng: np.random.Generator)
 
     A disc light is asked at one random point of its disc for each surface, a point light at its position.
     """
-    points = disc(rng.random((len(at.face), 2))) if light.radius > 0 else None
+    points = square_to_disc(rng.random((len(at.face), 2))) if light.radius > 0 else None
     return _arriving(light, tracer, at, points)
 
 
@@ -48,7 +48,7 @@ def on_pixels(
     width, height = size
     image = np.zeros(height * width, np.float32)
     tasks = [(i, slice(start, start + PIXELS)) for i, start in enumerate(range(0, len(seen.pixel), PIXELS))]
-    dealing = np.random.default_rng([seed, 0, 1])  # none of the streams of the near field's rays
+    dealing = streams.shadow_blocks(seed)
     _, index, cells = pixel_blocks.deal(seen.pixel, width, 1, block, int(dealing.integers(block * block)))
     shift, grid = dealing.random(2), pixel_blocks.lattice(cells)
 
@@ -57,7 +57,7 @@ def on_pixels(
         at = seen.rows(rows)
         if light.radius == 0:
             return _arriving(light, tracer, at, None)
-        places = pixel_blocks.jittered(index[rows, 0], grid, np.random.default_rng([seed, 1 + number, 1])) + shift
+        places = pixel_blocks.jittered(index[rows, 0], grid, streams.shadow_rays(seed, number)) + shift
         total = np.zeros(len(at.pixel))
         for i in range(samples):
             total += _arriving(light, tracer, at, _spiral(places % 1, i, samples))
@@ -84,7 +84,7 @@ def _arriving(light: Spotlight, tracer: Tracer, at: Hits | Surfaces, points: Arr
     """Irradiance over emission on surfaces (n), float64 (n,); from `points` of the unit disc, (n, 2), if any."""
     source = np.broadcast_to(np.asarray(light.position, float), at.position.shape)
     if points is not None:
-        right, up = frames(light.axis)
+        right, up = build_basis(light.axis)
         source = source + light.radius * (points[:, :1] * right + points[:, 1:] * up)
     to = source - at.position
     square = np.maximum(_dot(to, to), np.finfo(float).tiny)

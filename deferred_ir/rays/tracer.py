@@ -18,7 +18,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.rays.embree import INFINITE, Rays
-from deferred_ir.scene import materials
+from deferred_ir.scene.albedo import look_up_albedo
 from deferred_ir.scene.scene import Scene
 
 CHUNK = 1 << 15
@@ -122,7 +122,7 @@ class Tracer:
             has = length > 1e-6
             smooth[has] = turned(blend[has] / length[has, None], facing[has])
         normal[hit], shading[hit] = facing, smooth
-        albedo[hit] = materials.albedo(self.scene, face[hit], weights)
+        albedo[hit] = look_up_albedo(self.scene, face[hit], weights)
         return Hits(face, position, normal, shading, albedo)
 
     def occluded(self, origins: Array, targets: Array, *, lifted: bool = False) -> Bools:

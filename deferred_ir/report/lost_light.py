@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.rays.direct import lit_by
 from deferred_ir.rays.tracer import Tracer
+from deferred_ir.sampling import streams
+from deferred_ir.sampling.warps import lift_to_hemisphere
 from deferred_ir.scene.lights.spot import one_minus_cos
 from deferred_ir.scene.scene import Scene
-from deferred_ir.vpls.cast import LUMINANCE, lift_to_hemisphere
 
 GRID = 128
 RAYS = 8
@@ -27,7 +29,7 @@ def estimate(
     Of the first bounce, over the image, by luminance. given_back: what is lost within the clamp distance is added by
     short rays (deferred_ir/vpls/clamp_residual.py). None where the camera sees no indirect light.
     """
-    rng = np.random.default_rng(seed)
+    rng = streams.lost_light(seed)
     directions = scene.camera.rays((GRID, GRID)).reshape(-1, 3)
     seen = tracer.closest(np.broadcast_to(np.asarray(scene.camera.position, float), directions.shape), directions)
     seen_at = np.repeat(np.flatnonzero(seen.hit), RAYS)

@@ -1,6 +1,6 @@
-"""Sample patterns in the unit square, the map from there to a disc, and systematic resampling.
+"""Sample patterns in the unit square and systematic resampling.
 
-Sources: Shirley and Chiu 1997 (concentric map); Owen 1998, Joe and Kuo 2008 through scipy.stats.qmc (scrambled Sobol
+Sources: Owen 1998, Joe and Kuo 2008 through scipy.stats.qmc (scrambled Sobol
 and Halton).
 """
 
@@ -13,6 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.sampling.warps import square_to_disc
 
 log = logging.getLogger("deferred_ir")
 Pattern = Literal["random", "stratified", "halton", "sobol"]
@@ -30,17 +31,9 @@ def unit_square(pattern: Pattern, count: int, seed: int) -> Array:
 @lru_cache(maxsize=8)
 def unit_disc(pattern: Pattern, count: int, seed: int) -> Array:
     """`unit_square` mapped to the unit disc. Read-only: it is cached, for frames that repeat a seed."""
-    points = disc(unit_square(pattern, count, seed))
+    points = square_to_disc(unit_square(pattern, count, seed))
     points.flags.writeable = False
     return points
-
-
-def frame_seed(seed: int, frame: int) -> int:
-    """The seed of frame `frame` of those that are averaged under `seed`: `seed` itself, then numbers of 31 bits.
-
-    They are mixed from both, so that frames under one seed are none of those under another.
-    """
-    return seed if frame == 0 else int(np.random.SeedSequence([seed, frame]).generate_state(1)[0] >> 1)
 
 
 def warn_unbalanced(pattern: Pattern, count: int) -> None:
@@ -80,17 +73,6 @@ def _stratified(count: int, rng: np.random.Generator) -> Array:
     v = tops[row] + heights[row] * rng.random(count)
     points: Array = np.minimum(np.stack([u, v], axis=1), np.nextafter(1, 0))
     return points
-
-
-def disc(square: Array) -> Array:
-    """Points of the unit square (n, 2) to the unit disc, preserving area and strata (Shirley and Chiu 1997)."""
-    a, b = 2 * square[:, 0] - 1, 2 * square[:, 1] - 1
-    wide = np.abs(a) > np.abs(b)
-    radius = np.where(wide, a, b)
-    # The smaller over the larger coordinate; both are 0 only at the centre, where the angle does not matter.
-    ratio = np.where(wide, b, a) / np.where(radius == 0, 1, radius)
-    angle = np.where(wide, np.pi / 4 * ratio, np.pi / 2 - np.pi / 4 * ratio)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
 def systematic(weights: Array, count: int, offset: float) -> Ints:

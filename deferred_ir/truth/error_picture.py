@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array
+from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.base.files import write_whole
-from deferred_ir.truth.flip import LUMINANCE
 from deferred_ir.truth.metrics import EPSILON
 
 ERRORS = (-1.0, -0.5, 0.0, 0.5, 1.0)

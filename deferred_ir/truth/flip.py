@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array
+from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.base.errors import SettingError
 
-LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""Of linear sRGB primaries."""
 PIXELS_PER_DEGREE = 3840 * math.pi / 180
 """FLIP's own choice: a 0.7 m wide screen of 3840 pixels, seen from 0.7 m."""
 ACES = ((0.9036, 0.018, 0.0), (0.8748, 0.354, 0.14))

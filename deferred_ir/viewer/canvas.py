@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from deferred_ir.frame.frame import NEAR
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.shaders import ShaderLibrary
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.gl.window import Window
-from deferred_ir.scene.lights.spot import NEAR
 
 FOLDER = Path(__file__).parent
 COLORS, LINEAR, DEPTH, NUMBERS = range(4)

@@ -18,9 +18,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.sampling.patterns import Pattern, disc, systematic, unit_disc, unit_square
-from deferred_ir.scene.lights.spot import Spotlight, frames
+from deferred_ir.sampling import streams
+from deferred_ir.sampling.patterns import Pattern, systematic, unit_disc, unit_square
+from deferred_ir.sampling.warps import build_basis, lift_to_hemisphere, square_to_disc
+from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.vpls.kernel import cosine_ratio
 
 
@@ -41,9 +44,6 @@ class Vpls:
 
 
 NONE = Vpls(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, int))
-
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def cast(
@@ -67,15 +67,14 @@ def cast(
         rays = min(count, round(count * power.sum() / left)) if left > 0 else 0
         if rays == 0:
             break
-        rng = np.random.default_rng([seed, bounce])
+        rng = streams.bounce(seed, bounce)
         drawn = systematic(power, rays, rng.random())
         # Each bounce has a pattern of its own, shuffled: in its own order it would go with that of the bounce before.
-        square = rng.permutation(unit_square(pattern, rays, seed + bounce * 7919))
+        square = rng.permutation(unit_square(pattern, rays, streams.bounce_pattern(seed, bounce)))
         normal = last.normal[drawn]
         carried = last.emission[drawn] * (power.sum() / (rays * power[drawn]))[:, None]
-        made.append(
-            _land(tracer, tracer.lift(last.position[drawn], normal), lift_to_hemisphere(disc(square), normal), carried)
-        )
+        directions = lift_to_hemisphere(square_to_disc(square), normal)
+        made.append(_land(tracer, tracer.lift(last.position[drawn], normal), directions, carried))
     if len(made) == 1:
         return made[0]
     return Vpls(*(np.concatenate([getattr(part, f.name) for part in made]) for f in fields(Vpls)))
@@ -86,18 +85,11 @@ def _leave(light: Spotlight, count: int, pattern: Pattern, seed: int) -> tuple[A
     points = unit_disc(pattern, count, seed) * np.sin(np.radians(light.fov) / 2)
     origins = np.broadcast_to(np.asarray(light.position, float), (count, 3))
     if light.radius > 0:
-        on_disc = disc(np.random.default_rng([seed, 0]).permutation(unit_square(pattern, count, seed + 104729)))
-        right, up = frames(light.axis)
+        square = unit_square(pattern, count, streams.light_disc_pattern(seed))
+        on_disc = square_to_disc(streams.light_disc(seed).permutation(square))
+        right, up = build_basis(light.axis)
         origins = origins + light.radius * (on_disc[:, :1] * right + on_disc[:, 1:] * up)
     return origins, lift_to_hemisphere(points, light.axis[None])
-
-
-def lift_to_hemisphere(points: Array, axes: Array) -> Array:
-    """Points of the unit disc (n, 2) to unit directions about `axes` (n, 3) or (1, 3), on the hemisphere above them."""
-    right, up = frames(axes)
-    height = np.sqrt(np.maximum(1 - (points**2).sum(axis=1, keepdims=True), 0))
-    directions: Array = points[:, :1] * right + points[:, 1:] * up + height * axes
-    return directions
 
 
 def _land(tracer: Tracer, origins: Array, directions: Array, carried: Array) -> Vpls:

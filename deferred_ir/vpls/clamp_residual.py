@@ -22,7 +22,7 @@ from deferred_ir.base.parallel import in_order
 from deferred_ir.rays.direct import lit_by
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
-from deferred_ir.sampling import pixel_blocks
+from deferred_ir.sampling import pixel_blocks, streams
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.vpls.kernel import VplLimits
 
@@ -53,7 +53,7 @@ def residual(
     image = np.zeros((height * width, 4), np.float32)
     if limits.clamp <= 0:
         return image.reshape(height, width, 4)
-    dealing = np.random.default_rng(seed)
+    dealing = streams.residual_blocks(seed)
     traced, index, total = pixel_blocks.deal(seen.pixel, width, samples, block, int(dealing.integers(block * block)))
     shift = dealing.random(2, np.float32)
     each = index.shape[1]
@@ -65,7 +65,7 @@ def residual(
 
     def work(task: tuple[int, slice]) -> Array:
         number, chosen = task
-        rng = np.random.default_rng([seed, number])
+        rng = streams.residual_rays(seed, number)
         rows = np.repeat(traced[chosen], each)
         points = (pixel_blocks.jittered(index[chosen].reshape(-1), lattice, rng) + shift) % 1
         brought: Array = rays.bring(rows, points, rng).reshape(-1, each, 3).mean(axis=1) * emission

@@ -17,10 +17,12 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.versions import new_version, new_versions
 from deferred_ir.rays.tracer import Tracer
+from deferred_ir.sampling import streams
 from deferred_ir.sampling.disc_voronoi import Cells, most_crowded
-from deferred_ir.sampling.patterns import disc as unit_disc
+from deferred_ir.sampling.warps import build_basis
+from deferred_ir.sampling.warps import square_to_disc as unit_disc
 from deferred_ir.scene.geometry import carried
-from deferred_ir.scene.lights.spot import Spotlight, frames
+from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.vpls.cast import Vpls
 from deferred_ir.vpls.emission_disc import EmissionDisc
 from deferred_ir.vpls.kernel import cosine_ratio
@@ -48,7 +50,7 @@ class IncrementalVpls:
     at_rest = False
 
     def __init__(self, count: int, seed: int = 0) -> None:
-        self._rng = np.random.default_rng(seed)
+        self._rng = streams.incremental_vpls(seed)
         self._offset, self._born = self._rng.random(2), 0
         self._right: Array = np.zeros(3)
         self._spot: tuple[object, int] = None, 0
@@ -137,7 +139,7 @@ class IncrementalVpls:
         """Carry the disc's frame along with the axis, so that points of a disc light stay where they are on it."""
         right = self._right - (self._right @ light.axis) * light.axis
         length = np.linalg.norm(right)
-        self._right = right / length if length > 0.1 else frames(light.axis)[0]
+        self._right = right / length if length > 0.1 else build_basis(light.axis)[0]
 
     def _axes(self, light: Spotlight) -> Array:
         return np.stack([self._right, np.cross(light.axis, self._right)])

@@ -22,12 +22,14 @@ from contextlib import closing
 import numpy as np
 
 from deferred_ir.base.arrays import Array
+from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.base.parallel import in_order
 from deferred_ir.rays.tracer import Hits, Tracer
+from deferred_ir.sampling import streams
 from deferred_ir.sampling.hilbert import hilbert_order
 from deferred_ir.sampling.patterns import systematic, unit_square
 from deferred_ir.scene.camera import Camera
-from deferred_ir.vpls.cast import LUMINANCE, Vpls
+from deferred_ir.vpls.cast import Vpls
 from deferred_ir.vpls.kernel import VplLimits
 from deferred_ir.vpls.ray_sum import ScaledSurfaces, ScaledVpls
 
@@ -41,13 +43,11 @@ PAIRS = 1 << 15
 """Pairs of pixel and candidate in a task: their arrays stay in a core's cache, and its rays in one thread."""
 BITS = 10
 """Bits a coordinate on the curve."""
-STREAM = 65537
-"""Keeps random numbers apart from those of the bounces."""
 
 
 def find_probes(tracer: Tracer, camera: Camera, size: tuple[int, int], seed: int = 0) -> Hits:
     """Return the surfaces behind up to PROBES well-spread pixel centres of an image of `size` (width, height)."""
-    pixels = np.floor(unit_square("sobol", TRIES, seed + STREAM) * size) + 0.5
+    pixels = np.floor(unit_square("sobol", TRIES, streams.resampling_pattern(seed)) * size) + 0.5
     x, y = (pixels / size * 2 - 1).T
     directions = np.column_stack([x, y, np.ones(TRIES)]) @ camera.ray_axes(size)
     seen = tracer.closest(np.broadcast_to(np.asarray(camera.position, float), directions.shape), directions)
@@ -92,7 +92,7 @@ def resample(vpls: Vpls, effect: Array, count: int, seed: int = 0) -> Vpls:
     total = effect.sum()
     probability = EVEN * even + (1 - EVEN) * effect / total if total > 0 else even
     order = hilbert_order(_places(vpls), BITS)
-    drawn = systematic(probability[order], count, np.random.default_rng([seed, STREAM]).random())
+    drawn = systematic(probability[order], count, streams.resampling(seed).random())
     drawn, times = np.unique(drawn, return_counts=True)
     kept = order[drawn]
     gain = times * probability.sum() / (count * probability[kept])

@@ -52,7 +52,7 @@ def against_the_faces(scene: Scene) -> Scene:
 
 def painted(scene: Scene) -> Scene:
     """All surfaces of the grey that `papered` has, without a texture."""
-    from deferred_ir.scene.materials import srgb_table
+    from deferred_ir.base.colour import srgb_table
 
     return with_albedo(scene, float(srgb_table()[GREY].astype(np.float16)))
 

@@ -16,13 +16,13 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.progress import Progress
 from deferred_ir.engine.renderer import Renderer
+from deferred_ir.frame.frame import NEAR
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import graph_hash, load_graph
 from deferred_ir.graph.params import specs
 from deferred_ir.profiling.checks.visibility_pass import FOLDER, VisibilityPairs
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import NEAR
 from deferred_ir.scene.scene import Scene
 from deferred_ir.shadows.settings import WIDEST_PLANAR, MapParams
 

@@ -21,12 +21,12 @@ from statistics import median, quantiles
 from typing import Any
 
 from deferred_ir.base.errors import Error
+from deferred_ir.base.image_size import parse_size
 from deferred_ir.base.progress import track
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.gl.context import Gpu
 from deferred_ir.loading.load import load
-from deferred_ir.loading.scene_file import parse_size
 from deferred_ir.profiling.limits.host_costs import cold_start, python_time
 from deferred_ir.profiling.limits.passes import FOLDER, LIMITS
 from deferred_ir.profiling.measure import markdown

@@ -16,9 +16,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from deferred_ir.base.image_size import parse_size
 from deferred_ir.gl.window import Window
 from deferred_ir.loading.load import load
-from deferred_ir.loading.scene_file import parse_size
 from deferred_ir.profiling.measure import arguments, markdown
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.scene import Scene

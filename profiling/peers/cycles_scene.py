@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.base.colour import srgb_table
+from deferred_ir.sampling.warps import build_basis
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.geometry import Geometry
-from deferred_ir.scene.lights.spot import Spotlight, frames, one_minus_cos
-from deferred_ir.scene.materials import srgb_table
+from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
 from deferred_ir.scene.scene import Material, Scene, Texture
 
 POINT_POWER = 4 * np.pi
@@ -132,7 +133,7 @@ def _light(bpy: Any, spotlight: Spotlight) -> Any:
     emission.inputs["Color"].default_value = (*spotlight.emission, 1)
     nodes.join(emission.outputs["Emission"], nodes.add("ShaderNodeOutputLight").inputs["Surface"])
     made = bpy.data.objects.new("spotlight", light)
-    right, up = frames(spotlight.axis)
+    right, up = build_basis(spotlight.axis)
     made.matrix_world = _matrix(-right, up, -spotlight.axis, spotlight.position)
     made.visible_camera = False
     return made

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
+from deferred_ir.base.colour import srgb_table
 from deferred_ir.base.errors import SettingError
-from deferred_ir.scene.lights.spot import NEAR, Spotlight, one_minus_cos
-from deferred_ir.scene.materials import srgb_table
+from deferred_ir.frame.frame import NEAR
+from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
 from deferred_ir.scene.scene import Material, Scene
 
 SAMPLER = "multijitter"

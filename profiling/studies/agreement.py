@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from deferred_ir.base.image_size import parse_size
 from deferred_ir.base.progress import track
 from deferred_ir.loading.load import load
-from deferred_ir.loading.scene_file import parse_size
 from deferred_ir.profiling.measure import arguments
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene

@@ -17,12 +17,12 @@ from typing import Any
 
 from deferred_ir.base.errors import Error
 from deferred_ir.base.files import write_json
+from deferred_ir.base.image_size import parse_size
 from deferred_ir.base.progress import progress_bar, track
 from deferred_ir.engine.accumulation import Accumulation
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.engine.settings import parse_settings as settings_of
 from deferred_ir.loading.load import load
-from deferred_ir.loading.scene_file import parse_size
 from deferred_ir.profiling.measure import panels
 from deferred_ir.profiling.peers import ladder as peer_sweep
 from deferred_ir.profiling.sweep import edge_mask, reference

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from deferred_ir.base.image_size import parse_size
 from deferred_ir.base.progress import track
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
-from deferred_ir.loading.scene_file import parse_size
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.reference import reference

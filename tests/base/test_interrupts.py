@@ -14,7 +14,7 @@ except BaseException:
 """
 MAIN = """
 import sys, time
-from deferred_ir import interrupts
+from deferred_ir.base import interrupts
 try:
     with interrupts.patient():
         import greedy
@@ -34,7 +34,7 @@ def test_an_interrupt_during_an_import_waits_for_its_end(tmp_path):
 
 def test_outside_imports_it_comes_at_once():
     code = (
-        "import os, signal; from deferred_ir import interrupts\n"
+        "import os, signal; from deferred_ir.base import interrupts\n"
         "try:\n"
         "    with interrupts.patient(): os.kill(os.getpid(), signal.SIGINT)\n"
         "except KeyboardInterrupt: print('at once')"
@@ -45,7 +45,7 @@ def test_outside_imports_it_comes_at_once():
 
 def test_a_library_that_is_at_work_is_not_torn_apart():
     code = (
-        "import os, signal, sys; from deferred_ir import interrupts\n"
+        "import os, signal, sys; from deferred_ir.base import interrupts\n"
         "library = {'__name__': 'library', 'os': os, 'signal': signal}\n"
         "exec('''def work():\n"
         "    os.kill(os.getpid(), signal.SIGINT)\n"
@@ -63,7 +63,7 @@ def test_a_library_that_is_at_work_is_not_torn_apart():
 
 def test_handlers_are_given_back_and_no_interrupt_is_lost_on_the_way():
     code = (
-        "import os, signal; from deferred_ir import interrupts\n"
+        "import os, signal; from deferred_ir.base import interrupts\n"
         "before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGALRM)\n"
         "library = {'__name__': 'library', 'os': os, 'signal': signal}\n"
         "exec('def work(): os.kill(os.getpid(), signal.SIGINT)', library)\n"

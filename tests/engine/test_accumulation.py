@@ -21,7 +21,7 @@ from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import graph_names
-from deferred_ir.sampling.patterns import frame_seed
+from deferred_ir.sampling.streams import frame_seed
 
 SIZE = (32, 24)
 SMALL = ("--size", "32x32", "--vpls", "4", "--device", "software")

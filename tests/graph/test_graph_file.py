@@ -227,7 +227,7 @@ def test_a_base_that_is_not_there(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[passes", "not TOML: "),
+        ("[passes", "not a TOML file: "),
         ("passes = 3", "passes: wants a table [passes.NAME] for each pass"),
         ("[[passes]]", "passes: wants a table [passes.NAME] for each pass"),
         ("extends = 3", "extends: wants the name or path of a graph"),
@@ -251,8 +251,8 @@ def test_a_base_that_is_not_there(tmp_path):
         ('[passes.end]\ntype = "blur"\n"rad\\nius" = 1', "no such parameter"),
         ('[passes."e\\nd"]', "no pass type"),
         ('"ke\\ny" = 1', "no such key"),
-        (f"a = {'[' * 10_000}", "not TOML"),
-        (f"a = {'9' * 5000}", "not TOML"),
+        (f"a = {'[' * 10_000}", "not a TOML file"),
+        (f"a = {'9' * 5000}", "not a TOML file"),
     ],
     ids=lambda value: value[:40],
 )
@@ -269,7 +269,7 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path):
 
 def test_a_file_that_is_no_text(tmp_path):
     (tmp_path / "own.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(GraphError, match=r"own\.toml: cannot be read"):
+    with pytest.raises(GraphError, match=r"own\.toml: not a TOML file"):
         load_graph(tmp_path / "own.toml")
 
 

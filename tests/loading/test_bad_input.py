@@ -23,7 +23,7 @@ from deferred_ir.engine.renderer import Renderer
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import load_graph
 from deferred_ir.loading import gltf_checks, models
-from deferred_ir.scene import materials
+from deferred_ir.loading.textures import decode_texture
 
 MENDED = {
     "glTF nodes.0.rotation = [0, 0, 0, 0]",
@@ -105,7 +105,7 @@ def test_a_model_reads_the_scenes_folder_but_nothing_outside(tmp_path: Path) -> 
 def test_the_largest_image_is_one_that_drivers_take() -> None:
     image = Image.new("1", (8193, 8192))
     with pytest.raises(SceneError, match="big: 8193x8192 pixels, and 67108864 are the most; scale it down"):
-        materials.texture_from_image(image, "big", [])
+        decode_texture(image, "big", [])
 
 
 def test_many_images_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

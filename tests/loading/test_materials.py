@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from PIL import Image
 
+from deferred_ir.base.colour import linear_from_srgb
 from deferred_ir.base.errors import SceneError
-from deferred_ir.loading import merge, models
-from deferred_ir.scene import materials
+from deferred_ir.loading import merge, models, textures
+from deferred_ir.loading.model_data import GREY
+from deferred_ir.scene.albedo import look_up_albedo, sample_texture
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.scene import Scene, Texture
@@ -48,7 +50,7 @@ def test_kd_is_not_rounded(tmp_path: Path) -> None:
     assert scene.materials[0].albedo == (0.1234, 0.03, 0.98765)
     assert scene.materials[0].name == "m"
     weights = np.array([[0.2, 0.3, 0.5]])
-    assert materials.albedo(scene, np.array([0]), weights) == pytest.approx(np.array([[0.1234, 0.03, 0.98765]]))
+    assert look_up_albedo(scene, np.array([0]), weights) == pytest.approx(np.array([[0.1234, 0.03, 0.98765]]))
     assert scene.notes == ()
 
 
@@ -70,17 +72,17 @@ def test_kd_that_is_no_reflectance(tmp_path: Path, kd: str) -> None:
 
 def test_without_a_material_it_is_grey(tmp_path: Path) -> None:
     (tmp_path / "model.obj").write_text(SQUARE + "f 1 2 3 4\n")
-    assert scene_of(tmp_path / "model.obj").materials[0].albedo == materials.GREY
+    assert scene_of(tmp_path / "model.obj").materials[0].albedo == GREY
     (tmp_path / "model.obj").write_text(SQUARE + "f 1/1 2/2 3/3\n")
     scene = scene_of(tmp_path / "model.obj")
-    assert scene.materials[0].albedo == materials.GREY
+    assert scene.materials[0].albedo == GREY
     assert scene.textures == ()
 
 
 def test_missing_kd_is_grey_with_a_note(tmp_path: Path) -> None:
     for line in ("Ks 1 1 1", "Kd spectral file.rfl", ""):
         scene = scene_with(tmp_path, f"newmtl m\n{line}\nNs 3\n")
-        assert scene.materials[0].albedo == materials.GREY
+        assert scene.materials[0].albedo == GREY
         assert any("material m has no Kd" in note for note in scene.notes)
 
 
@@ -93,7 +95,7 @@ def test_other_lines_of_a_material_file_do_no_harm(tmp_path: Path) -> None:
 def test_missing_material_file_and_material_are_noted(tmp_path: Path) -> None:
     (tmp_path / "model.obj").write_text(f"# no mtllib here\nmtllib gone.mtl\n{SQUARE}{FACES}")
     scene = scene_of(tmp_path / "model.obj")
-    assert scene.materials[0].albedo == materials.GREY
+    assert scene.materials[0].albedo == GREY
     assert scene.notes[:2] == (
         "model.obj: its material file gone.mtl is missing",
         "model.obj: no material m; its surfaces are grey",
@@ -117,7 +119,7 @@ def test_map_kd_replaces_kd(tmp_path: Path) -> None:
     assert scene.materials[0].albedo == (1.0, 1.0, 1.0)
     assert scene.materials[0].texture == 0
     assert scene.textures[0].pixels.shape == (2, 4, 3)
-    found = materials.albedo(scene, np.array([0, 1]), np.full((2, 3), 1 / 3))
+    found = look_up_albedo(scene, np.array([0, 1]), np.full((2, 3), 1 / 3))
     assert found == pytest.approx(np.tile([srgb(188), 0, 1], (2, 1)), rel=1e-6)
 
 
@@ -134,7 +136,7 @@ def test_texture_stands_upright(tmp_path: Path) -> None:
         system = np.vstack([edges.T, np.ones(3)])
         weights = np.linalg.solve(system, [*centre_of_texel, 1.0])
         if weights.min() > -1e-9:
-            assert materials.albedo(scene, np.array([face]), weights[None]) == pytest.approx(np.ones((1, 3)))
+            assert look_up_albedo(scene, np.array([face]), weights[None]) == pytest.approx(np.ones((1, 3)))
             position = weights @ geometry.positions[geometry.faces[face]]
             assert position[:2] == pytest.approx(centre_of_texel)  # v runs up, as y does
 
@@ -195,7 +197,7 @@ def test_kinds_of_images(mode: str) -> None:
         image = Image.fromarray(grey).convert("RGB").convert(mode)
     assert image.mode == mode
     notes: list[str] = []
-    texture = materials.texture_from_image(image, "t.png", notes)
+    texture = textures.decode_texture(image, "t.png", notes)
     assert texture.pixels.dtype == np.uint8
     assert np.abs(texture.pixels.astype(int) - grey[:, :, None]).max() <= (1 if mode in ("CMYK", "YCbCr") else 0)
     assert bool(notes) == ("A" in mode)
@@ -210,14 +212,14 @@ def test_vertex_colours_are_srgb_and_multiply(tmp_path: Path) -> None:
     linear = np.vectorize(srgb)(levels[:, :3])
     assert scene.geometry.colors == pytest.approx(linear, rel=1e-6)
     weights = np.array([[0.2, 0.3, 0.5]])
-    assert materials.albedo(scene, np.array([0]), weights) == pytest.approx(weights @ linear, rel=1e-6)
+    assert look_up_albedo(scene, np.array([0]), weights) == pytest.approx(weights @ linear, rel=1e-6)
 
 
 def test_obj_vertex_colours_multiply_kd(tmp_path: Path) -> None:
     vertices = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.5\n"
     scene = scene_with(tmp_path, "newmtl m\nKd 0.5 0.5 0.5\n", "usemtl m\nf 1 2 3\n", vertices)
     assert scene.geometry.colors == pytest.approx(np.array([[1, 0, 0], [0, 1, 0], [0, 0, srgb(127.5)]]), rel=1e-6)
-    assert materials.albedo(scene, np.array([0]), np.array([[1.0, 0, 0]])) == pytest.approx(np.array([[0.5, 0, 0]]))
+    assert look_up_albedo(scene, np.array([0]), np.array([[1.0, 0, 0]])) == pytest.approx(np.array([[0.5, 0, 0]]))
 
 
 def test_face_colours(tmp_path: Path) -> None:
@@ -225,7 +227,7 @@ def test_face_colours(tmp_path: Path) -> None:
     box.visual.face_colors = np.arange(12)[:, None] * [20, 10, 5, 0] + [0, 0, 0, 255]
     box.export(tmp_path / "model.ply")
     scene = scene_of(tmp_path / "model.ply")
-    found = materials.albedo(scene, np.arange(12), np.full((12, 3), 1 / 3))
+    found = look_up_albedo(scene, np.arange(12), np.full((12, 3), 1 / 3))
     assert found == pytest.approx(np.vectorize(srgb)(np.arange(12)[:, None] * [20, 10, 5]), rel=1e-6)
 
 
@@ -262,7 +264,7 @@ def naive_sample(pixels: np.ndarray, u: float, v: float) -> np.ndarray:
     ),
 )
 def test_lookup_equals_a_naive_one(pixels: np.ndarray, uvs: list[tuple[float, float]]) -> None:
-    found = materials.sample(Texture("t", pixels), np.array(uvs))
+    found = sample_texture(Texture("t", pixels), np.array(uvs))
     expected = np.array([naive_sample(pixels, u, v) for u, v in uvs])
     assert found == pytest.approx(expected, abs=1e-6)
 
@@ -270,13 +272,13 @@ def test_lookup_equals_a_naive_one(pixels: np.ndarray, uvs: list[tuple[float, fl
 def test_texel_centres_give_texels() -> None:
     pixels = np.arange(36, dtype=np.uint8).reshape(3, 4, 3) * 7
     u, v = np.meshgrid((np.arange(4) + 0.5) / 4, 1 - (np.arange(3) + 0.5) / 3)
-    found = materials.sample(Texture("t", pixels), np.stack([u, v], axis=-1).reshape(-1, 2))
+    found = sample_texture(Texture("t", pixels), np.stack([u, v], axis=-1).reshape(-1, 2))
     assert found.reshape(3, 4, 3) == pytest.approx(np.vectorize(srgb)(pixels), abs=1e-6)
 
 
 @settings(deadline=None)
 @given(npst.arrays(np.float64, st.tuples(st.integers(0, 6), st.just(3)), elements=st.floats(0, 1)))
 def test_srgb_decoding_is_monotonic_and_in_range(values: np.ndarray) -> None:
-    linear = materials.linear_from_srgb(values)
+    linear = linear_from_srgb(values)
     assert ((linear >= 0) & (linear <= values + 1e-12)).all()
     assert linear == pytest.approx(np.vectorize(lambda value: srgb(value * 255), otypes=[float])(values))

@@ -10,7 +10,7 @@ import trimesh
 
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading import merge, models
-from deferred_ir.loading.models import ModelData
+from deferred_ir.loading.model_data import ModelData
 from deferred_ir.scene.scene import Geometry
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"

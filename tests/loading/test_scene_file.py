@@ -275,13 +275,6 @@ def test_the_view_is_checked_at_any_scale(tmp_path: Path, scale: float) -> None:
     assert "camera.up" in fault(tmp_path, camera(f"[0, 0, {scale}]"))
 
 
-@pytest.mark.parametrize(
-    ("text", "size"), [("64x32", (64, 32)), (" 8 X 9 ", (8, 9)), ("8", None), ("0x1", None), ("-1x1", None)]
-)
-def test_parse_size(text: str, size: tuple[int, int] | None) -> None:
-    assert scene_file.parse_size(text) == size
-
-
 WORDS = (
     "name model path scale translate motion times translations rotations camera position look_at up fov positions "
     "look_ats spotlight emission radius kind amplitude speed render graph size vpls seed set x.y"

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from small_scenes import GREY, Mesh, box, build, plane, quad, room, sphere, textured
 
-from deferred_ir.frame.frame import FRAME, Frame
+from deferred_ir.base.colour import srgb_table
+from deferred_ir.frame.frame import FRAME, NEAR, Frame
 from deferred_ir.loading.load import load
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import NEAR
-from deferred_ir.scene.materials import srgb_table
 from deferred_ir.scene.scene import Scene
 
 SIZE = (112, 80)

@@ -8,8 +8,9 @@ from fixed_lights import lit_by, spot_record, vpl_records
 from small_scenes import build, plane, quad, room
 
 from deferred_ir.base.errors import DeviceError, GraphError
+from deferred_ir.frame.frame import NEAR
 from deferred_ir.gl import raw
-from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK, NEAR
+from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 
 SIZE = (32, 32)
 SETTINGS = {"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}

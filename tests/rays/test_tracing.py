@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from small_scenes import Mesh, box, build, plane, room, sphere, textured
 
+from deferred_ir.base.colour import linear_from_srgb
 from deferred_ir.base.errors import DeviceError
 from deferred_ir.rays.tracer import CHUNK, Tracer, turned
-from deferred_ir.scene.materials import linear_from_srgb
 
 RNG = np.random.default_rng(7)
 

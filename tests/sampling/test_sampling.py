@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import kstest, qmc
 
-from deferred_ir.sampling.patterns import PATTERNS, disc, unit_square
+from deferred_ir.sampling.patterns import PATTERNS, unit_square
+from deferred_ir.sampling.warps import square_to_disc
 
 COUNTS = (0, 1, 2, 3, 5, 7, 16, 60, 64, 100, 255, 1000)
 
@@ -88,7 +89,7 @@ def test_sobol_points_are_stratified_in_each_elementary_interval(m):
 
 
 def test_the_disc_is_filled_evenly():
-    points = disc(unit_square("random", 1_000_000, 0))
+    points = square_to_disc(unit_square("random", 1_000_000, 0))
     radius, angle = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
     assert radius.max() <= 1
     assert radius.mean() == pytest.approx(2 / 3, rel=1e-3)
@@ -106,13 +107,15 @@ def test_the_disc_map_preserves_area_everywhere(u, v):
     near_kink = abs(u - v) < 4 * h or abs(u + v - 1) < 4 * h
     if near_kink:
         return
-    p = disc(np.array([[u - h, v], [u + h, v], [u, v - h], [u, v + h]]))
+    p = square_to_disc(np.array([[u - h, v], [u + h, v], [u, v - h], [u, v + h]]))
     du, dv = (p[1] - p[0]) / (2 * h), (p[3] - p[2]) / (2 * h)
     assert abs(du[0] * dv[1] - du[1] * dv[0]) == pytest.approx(np.pi, rel=1e-4)
 
 
 def test_the_centre_and_the_corners_of_the_square():
-    points = disc(np.array([[0.5, 0.5], [0, 0.5], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0], [1, 1], [1, 0], [0, 1]]))
+    points = square_to_disc(
+        np.array([[0.5, 0.5], [0, 0.5], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0], [1, 1], [1, 0], [0, 1]])
+    )
     assert np.isfinite(points).all()
     np.testing.assert_allclose(points[:5], [[0, 0], [-1, 0], [0, -1], [1, 0], [0, 1]], atol=1e-15)
     np.testing.assert_allclose(np.hypot(*points[5:].T), 1)
@@ -121,5 +124,5 @@ def test_the_centre_and_the_corners_of_the_square():
 @given(st.tuples(st.floats(0, 1), st.floats(0, 1)))
 def test_neighbours_stay_neighbours(point):
     step = np.array([[0, 0], [1e-5, 0], [0, 1e-5]])
-    p = disc(np.clip(np.array(point) * (1 - 1e-5) + step, 0, 1))
+    p = square_to_disc(np.clip(np.array(point) * (1 - 1e-5) + step, 0, 1))
     assert np.linalg.norm(p[1:] - p[0], axis=1).max() < 5e-5

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from deferred_ir.scene.lights.spot import LIGHT, SPOT_TILE, Spotlight, frames, light_records, one_minus_cos
+from deferred_ir.sampling.warps import build_basis
+from deferred_ir.scene.lights.spot import LIGHT, SPOT_TILE, Spotlight, light_records, one_minus_cos
 
 COORDINATE = st.floats(-1, 1)
 
@@ -32,7 +33,7 @@ def test_frames_hold_at_the_poles(axis):
 
 
 def check_frame(axis: np.ndarray) -> None:
-    right, up = frames(axis)
+    right, up = build_basis(axis)
     rows = np.stack([right, up, axis])
     np.testing.assert_allclose(rows @ rows.T, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(np.cross(right, up), axis, atol=1e-12)
@@ -41,16 +42,16 @@ def check_frame(axis: np.ndarray) -> None:
 def test_frames_of_many_axes_are_those_of_each():
     axes = np.random.default_rng(1).normal(size=(5, 4, 3))
     axes /= np.linalg.norm(axes, axis=-1, keepdims=True)
-    right, up = frames(axes)
+    right, up = build_basis(axes)
     assert right.shape == up.shape == (5, 4, 3)
-    np.testing.assert_array_equal(right[2, 3], frames(axes[2, 3])[0])
+    np.testing.assert_array_equal(right[2, 3], build_basis(axes[2, 3])[0])
 
 
 @pytest.mark.parametrize("fov", [0.1, 1.0, 40.0, 80.0, 150.0, 179.0])
 def test_the_cone_is_the_naive_formula(fov):
     light = Spotlight((0, 0, 0), (1, 2, -3), fov)
     half = math.radians(fov) / 2
-    right, _ = frames(light.axis)
+    right, _ = build_basis(light.axis)
     theta = half * np.linspace(0, 1.5, 301)
     theta = theta[theta < math.pi]
     directions = np.cos(theta)[:, None] * light.axis + np.sin(theta)[:, None] * right
@@ -64,7 +65,7 @@ def test_the_cone_is_stable_where_cosines_cancel(fov):
     """For a narrow cone 1 - cos is theta^2/2, so the factor is 4 (1 - (theta/half)^2) to 1e-6 and better."""
     light = Spotlight((0, 0, 0), (1, 2, -3), fov)
     half = math.radians(fov) / 2
-    right, _ = frames(light.axis)
+    right, _ = build_basis(light.axis)
     fraction = np.linspace(0, 1.2, 200)
     directions = np.cos(fraction * half)[:, None] * light.axis + np.sin(fraction * half)[:, None] * right
     np.testing.assert_allclose(light.cone(directions), np.clip(4 * (1 - fraction**2), 0, 1), atol=2e-6)
@@ -110,7 +111,7 @@ def test_the_map_axes_take_the_cone_to_the_unit_square(fov):
     """A direction at the edge of the cone along the map's right lands at NDC (1, 0)."""
     axis = unit(0.3, -0.9, -0.2)
     record = light_records(np.zeros((1, 3)), axis[None], np.ones((1, 3)), fov=fov, tile=SPOT_TILE)[0]
-    right, up = frames(axis)
+    right, up = build_basis(axis)
     half = math.radians(fov) / 2
     for direction, ndc in ((right, (1, 0)), (-right, (-1, 0)), (up, (0, 1)), (-up, (0, -1))):
         d = math.cos(half) * axis + math.sin(half) * direction

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.engine.renderer import Renderer
+from deferred_ir.frame.frame import NEAR
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.scene.lights.spot import NEAR
 
 AROUND = [(x, y) for y in (-1, 0, 1) for x in (-1, 0, 1)]
 CENTRE = AROUND.index((0, 0))

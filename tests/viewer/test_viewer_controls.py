@@ -314,7 +314,7 @@ def test_shaders_and_graphs_are_read_again_and_a_broken_edit_keeps_the_picture(v
     assert np.array_equal(picture(viewer), before[..., ::-1])
     graph.write_text("[passes")
     frames(viewer)
-    assert "mine.toml: not TOML" in viewer.session.error
+    assert "mine.toml: not a TOML file" in viewer.session.error
     graph.write_text('extends = "deferred"\n[passes.vpl]\ncount = 4\n')
     tonemap.write_text(text)
     frames(viewer)

@@ -11,10 +11,10 @@ from PIL import Image
 from virtual_display import FEW, SIZE, Spy, act, arrange, cornell, frames, middle, picture, rendered, xdo
 
 from deferred_ir.cli import main
+from deferred_ir.frame.frame import NEAR
 from deferred_ir.frame.light_culling import shining
 from deferred_ir.graph.file import graph_hash, load_graph
 from deferred_ir.loading.load import load
-from deferred_ir.scene.lights.spot import NEAR
 from deferred_ir.viewer.panels import reference
 from deferred_ir.viewer.panels import side_panel as panels
 from deferred_ir.viewer.panels.light_frames import records

@@ -8,10 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small_scenes import box, build, room, sphere
 
+from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.sampling.patterns import systematic
 from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.vpls.cast import LUMINANCE, cast
+from deferred_ir.vpls.cast import cast
 
 LIGHT = Spotlight((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), 120.0, (3.0, 2.0, 1.0))
 

@@ -11,10 +11,11 @@ import pytest
 from closed_forms import mean_cone_factor
 from small_scenes import box, build, plane, room, scaled, sphere, textured
 
+from deferred_ir.base.colour import linear_from_srgb
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.sampling.patterns import PATTERNS, disc, systematic
+from deferred_ir.sampling.patterns import PATTERNS, systematic
+from deferred_ir.sampling.warps import square_to_disc
 from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.materials import linear_from_srgb
 from deferred_ir.vpls import cast as vpls
 from deferred_ir.vpls.cast import cast
 
@@ -24,7 +25,7 @@ CLOSED = build(box((-1, -1, -1), (1, 1, 1), ALBEDO), spotlight=LIGHT)
 
 
 def test_the_closed_form_is_that_of_the_spotlights_own_cone():
-    points = disc(np.random.default_rng(0).random((400_000, 2))) * math.sin(math.radians(50))
+    points = square_to_disc(np.random.default_rng(0).random((400_000, 2))) * math.sin(math.radians(50))
     directions = np.column_stack([points, np.sqrt(1 - (points**2).sum(axis=1))])
     assert Spotlight((0, 0, 0), (0, 0, 1), 100.0).cone(directions).mean() == pytest.approx(
         mean_cone_factor(100), rel=3e-3
@@ -169,7 +170,7 @@ def test_units_of_length_do_not_matter(scale):
 def test_rays_on_the_very_rim_of_a_half_space_are_fine(monkeypatch):
     """sin^2 + cos^2 may round to more than 1."""
     rim = np.column_stack([np.zeros(100_000), np.linspace(0, 1, 100_000)])
-    monkeypatch.setattr(vpls, "unit_disc", lambda *_: disc(rim))
+    monkeypatch.setattr(vpls, "unit_disc", lambda *_: square_to_disc(rim))
     lights = cast(replace(LIGHT, fov=np.nextafter(180, 0)), Tracer(CLOSED), len(rim))
     assert np.isfinite(lights.emission).all()
 

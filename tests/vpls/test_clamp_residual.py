@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from small_scenes import build, plane, quad, room, scaled, sphere, textured
 
+from deferred_ir.frame.frame import NEAR
 from deferred_ir.rays.pixel_surfaces import Surfaces, from_gbuffer
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import NEAR, Spotlight
+from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.truth.path_tracer import PathTracer
 from deferred_ir.vpls.cast import cast
 from deferred_ir.vpls.clamp_residual import residual

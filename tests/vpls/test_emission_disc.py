@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from closed_forms import mean_cone_factor
 
-from deferred_ir.sampling.patterns import disc, unit_disc
-from deferred_ir.scene.lights.spot import Spotlight, frames
-from deferred_ir.vpls.cast import lift_to_hemisphere
+from deferred_ir.sampling.patterns import unit_disc
+from deferred_ir.sampling.warps import build_basis, lift_to_hemisphere, square_to_disc
+from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.vpls.emission_disc import EmissionDisc
 
 FOVS = [0.1, 30.0, 100.0, 160.0, 179.99]
@@ -18,13 +18,13 @@ FOVS = [0.1, 30.0, 100.0, 160.0, 179.99]
 
 def disc_of(fov):
     light = Spotlight((0.3, 0.2, 0.1), (1.0, -2.0, 0.4), fov)
-    return light, EmissionDisc(light, np.stack(frames(light.axis)))
+    return light, EmissionDisc(light, np.stack(build_basis(light.axis)))
 
 
 @pytest.mark.parametrize("fov", FOVS)
 def test_points_and_directions_are_each_others_reverse(fov):
     light, emission = disc_of(fov)
-    points = 0.999 * disc(np.random.default_rng(1).random((1000, 2)))
+    points = 0.999 * square_to_disc(np.random.default_rng(1).random((1000, 2)))
     directions = emission.directions(points)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1)
     assert emission.inside(directions).all()

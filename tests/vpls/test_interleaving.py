@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from small_scenes import Mesh, box, build, crooked_room, plane, quad, room, sphere
 
 from deferred_ir.base.errors import GraphError
+from deferred_ir.frame.frame import NEAR
 from deferred_ir.loading.load import load
 from deferred_ir.rays.pixel_surfaces import from_gbuffer
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import NEAR
 from deferred_ir.vpls.interleaving import deal, find_share_starts, find_sub_buffers
 
 ANGLE = np.radians(25)

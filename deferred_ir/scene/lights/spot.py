@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.sampling.warps import build_basis
 from deferred_ir.scene.motion import SpotlightMotion
 
 LIGHT = np.dtype(
@@ -33,15 +34,6 @@ LIGHT = np.dtype(
 
 LIGHTS_PER_BLOCK = 192
 """Lights in a uniform block: OpenGL promises 16 KiB (204 lights), and blocks must start at multiples of 256 bytes."""
-
-NEAR = 1e-8
-"""Near planes of camera and lights, as a fraction of the scene's scale: what is nearer is cut away.
-
-Walls so close to a light that they are cut let light through. A light's own surface, which roundings put a little
-before or behind it, is kept out of its map by lifting the light off instead (frame/light_buffer.off_surface,
-lib/shadows/projection.glsl). Depths, near / distance in 32-bit floats, have the same relative precision whatever the
-near plane.
-"""
 
 SPOT_TILE = -1.0
 
@@ -84,19 +76,6 @@ def one_minus_cos(fov: float) -> float:
     return 2 * math.sin(math.radians(fov) / 4) ** 2
 
 
-def frames(axes: Array) -> tuple[Array, Array]:
-    """Right and up vectors that make right-handed orthonormal frames with unit `axes` (..., 3) (Duff et al. 2017)."""
-    axes = np.asarray(axes, dtype=np.float64)
-    x, y, z = axes[..., 0], axes[..., 1], axes[..., 2]
-    sign = np.where(z < 0, -1.0, 1.0)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    right, up = np.empty_like(axes), np.empty_like(axes)
-    right[..., 0], right[..., 1], right[..., 2] = 1 + sign * x * x * a, sign * b, -sign * x
-    up[..., 0], up[..., 1], up[..., 2] = b, sign + y * y * a, -y
-    return right, up
-
-
 def light_records(position: Array, axis: Array, emission: Array, *, fov: float, tile: Array | float) -> np.ndarray:
     """Pack lights with one cone angle `fov` (degrees) into LIGHT records, shape (n,). Inputs are (n, 3), tile (n,)."""
     records = np.zeros(len(position), dtype=LIGHT)
@@ -108,7 +87,7 @@ def fill_records(
     records: np.ndarray, position: Array, axis: Array, emission: Array, *, fov: float, tile: Array | float
 ) -> None:
     """As `light_records`, into zeroed records (n,) that are there."""
-    right, up = frames(axis)
+    right, up = build_basis(axis)
     half = math.radians(fov) / 2
     tangent, cosine = math.tan(half), math.cos(half)
     records["position"], records["z_axis"], records["emission"] = position, axis, emission

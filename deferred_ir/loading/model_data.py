@@ -1,0 +1,56 @@
+"""What is read from a model file, whatever its format."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Ints, Vec3
+from deferred_ir.base.errors import SceneError
+from deferred_ir.scene.scene import Material, Texture
+
+GREY = (0.8, 0.8, 0.8)
+"""Albedo of a surface for which the file gives none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One mesh of a model file, placed in the world, with one material.
+
+    Arrays are as in `Geometry`; uvs are None without a texture.
+    """
+
+    positions: Array
+    faces: Ints
+    material: Material
+    texture: Texture | None
+    normals: Array | None
+    uvs: Array | None
+    colors: Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class ModelData:
+    """The contents of one model file: its parts in a fixed order, and notes on what is not honoured."""
+
+    name: str
+    parts: tuple[Part, ...]
+    notes: tuple[str, ...]
+
+
+def check_albedo(values: Any, where: str, notes: list[str]) -> Vec3:
+    """Return a file's linear RGB as an albedo: one number stands for all three, and above 1 it is cut to 1 with a note.
+
+    Raises SceneError unless all are finite numbers of 0 or more.
+    """
+    numbers = [float(value) for value in np.ravel(values)]
+    numbers = numbers * 3 if len(numbers) == 1 else numbers[:3]
+    if len(numbers) != 3 or not all(math.isfinite(value) and value >= 0 for value in numbers):
+        raise SceneError(f"{where}: reflectance {numbers} must be three finite numbers of 0 or more; mend the file")
+    if max(numbers) > 1:
+        notes.append(f"{where}: reflectance above 1 is cut to 1")
+    red, green, blue = (min(value, 1.0) for value in numbers)
+    return red, green, blue

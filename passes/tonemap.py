@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, get_args
 
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.pass_io import FullscreenPass
+from deferred_ir.frame.fullscreen import FullscreenPass
 from deferred_ir.graph.params import param
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 

@@ -14,9 +14,11 @@ from deferred_ir.base.errors import DeviceError
 from deferred_ir.engine.reuse import Runs
 from deferred_ir.frame.frame import FRAME, Frame
 from deferred_ir.frame.pass_io import Io, Resource, new_state
+from deferred_ir.gl.buffers import GpuBuffer
 from deferred_ir.gl.context import Gpu
+from deferred_ir.gl.framebuffers import Framebuffer
 from deferred_ir.gl.shaders import ShaderLibrary
-from deferred_ir.gl.textures import Framebuffer, GpuBuffer, GpuTexture
+from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.gl.timers import Timers
 from deferred_ir.graph.aliasing import alias_textures
 from deferred_ir.graph.graph import Plan, Step

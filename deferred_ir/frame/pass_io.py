@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 
 from deferred_ir.base.errors import DeviceError, ShaderError
-from deferred_ir.frame.frame import Frame
+from deferred_ir.gl.buffers import GpuBuffer
+from deferred_ir.gl.framebuffers import Framebuffer
 from deferred_ir.gl.shaders import Program, ShaderLibrary
-from deferred_ir.gl.textures import Framebuffer, GpuBuffer, GpuTexture
+from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.graph import Step
-from deferred_ir.graph.params import specs
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Output
 
@@ -145,28 +145,3 @@ def new_state(work: Pass) -> Any:
 
 def _colour(resource: Resource | None) -> bool:
     return isinstance(resource, GpuTexture) and not resource.format.depth
-
-
-class FullscreenPass(Pass):
-    """A pass that runs `fragment` once a pixel: inputs are samplers and parameters are uniforms of the same name.
-
-    A pass of this kind is its ports and its parameters.
-    """
-
-    fragment: ClassVar[str]
-    vertex: ClassVar[str] = "fullscreen.vert"
-
-    def uniforms(self) -> Mapping[str, Any]:
-        """Uniform values; parameters by default."""
-        return {name: getattr(self.params, name) for name in specs(self.Params)}
-
-    def defines(self, frame: Frame) -> Mapping[str, int | float]:
-        """Defines that choose a variant of the shader for this frame; none by default."""
-        del frame
-        return NO_DEFINES
-
-    def execute(self, frame: Frame, io: Io) -> None:
-        """Draw the fullscreen triangle."""
-        program = io.program(self.fragment, self.vertex, defines=self.defines(frame))
-        program.set(**self.uniforms())
-        program.draw_fullscreen()

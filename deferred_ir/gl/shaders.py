@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.errors import ShaderError, did_you_mean
+from deferred_ir.gl import raw
 from deferred_ir.gl.context import Gpu
 
 VERSION = "#version 430 core"
@@ -29,11 +30,6 @@ _WORD = re.compile(r"[A-Za-z_]\w*")
 _SUFFIXES = {*STAGES, ".glsl"}
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 _MESSAGE = re.compile(r"^(?:ERROR: )?\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*(.*)$", re.MULTILINE)  # Mesa, NVIDIA, AMD, Intel
-# Every GL_*SAMPLER_*: float, shadow, rectangle and buffer, array, signed, unsigned, cube array, multisampled.
-_SAMPLERS = {
-    *(*range(0x8B5D, 0x8B65), *range(0x8DC0, 0x8DC6), *range(0x8DC9, 0x8DD9)),
-    *(*range(0x900C, 0x9010), *range(0x9108, 0x910E)),
-}
 
 
 @dataclass(frozen=True)
@@ -99,7 +95,7 @@ class Program:
         self.attributes = [
             key for key, m in members.items() if type(m).__name__ == "Attribute" and not key.startswith("gl_")
         ]
-        self.samplers = frozenset(key for key, m in self._uniforms.items() if m.gl_type in _SAMPLERS)
+        self.samplers = frozenset(key for key, m in self._uniforms.items() if m.gl_type in raw.SAMPLERS)
 
     def set(self, **values: Any) -> None:
         """Set uniforms. One that this variant of the shader does not use is passed over; an unknown one is an error."""

@@ -128,8 +128,8 @@ class Window:
         width, height = self.size
         pixels = np.empty((height, width, 3), np.uint8)
         self.gl.BindFramebuffer(raw.FRAMEBUFFER, 0)
-        self.gl.PixelStorei(0x0D05, 1)  # PACK_ALIGNMENT
-        self.gl.ReadPixels(0, 0, width, height, 0x1907, 0x1401, pixels.ctypes.data_as(ctypes.c_void_p))  # RGB, bytes
+        self.gl.PixelStorei(raw.PACK_ALIGNMENT, 1)
+        self.gl.ReadPixels(0, 0, width, height, raw.RGB, raw.UNSIGNED_BYTE, pixels.ctypes.data_as(ctypes.c_void_p))
         return np.ascontiguousarray(pixels[::-1])
 
     def resize(self, size: tuple[int, int]) -> None:

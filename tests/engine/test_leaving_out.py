@@ -13,7 +13,7 @@ from moving_scenes import room_with_moving_models
 from small_scenes import build, crooked_room, gable, plane, room
 
 from deferred_ir.cli import main
-from deferred_ir.frame.pass_io import FullscreenPass
+from deferred_ir.frame.fullscreen import FullscreenPass
 from deferred_ir.frame.screen_tiles import Tiles
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.aliasing import alias_textures

@@ -13,7 +13,8 @@ from small_scenes import build, plane, room
 
 from deferred_ir.cli import main
 from deferred_ir.frame.frame import Frame
-from deferred_ir.gl.textures import GpuBuffer, GpuTexture
+from deferred_ir.gl.buffers import GpuBuffer
+from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.pass_base import FRAME_PARTS
 
 SIZE = (32, 24)

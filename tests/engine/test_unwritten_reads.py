@@ -8,7 +8,7 @@ import pytest
 from small_scenes import build, plane, room, sphere
 
 from deferred_ir.engine.unwritten_reads import unwritten_reads
-from deferred_ir.gl.textures import Framebuffer
+from deferred_ir.gl.framebuffers import Framebuffer
 
 SIZE = (40, 28)
 GRAPHS = ["forward", "deferred", "hemisphere", "interleaved", "accurate", "accurate by rays", "incremental"]

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from deferred_ir.base.errors import DeviceError
+from deferred_ir.gl.buffers import GpuBuffer
+from deferred_ir.gl.formats import FORMATS
+from deferred_ir.gl.framebuffers import Framebuffer
 from deferred_ir.gl.raw import GL
-from deferred_ir.gl.textures import FORMATS, Framebuffer, GpuBuffer, GpuTexture
+from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.gl.timers import Timers
 from deferred_ir.graph.ports import Buffer, Texture
 

@@ -11,7 +11,8 @@ from small_scenes import gable, room, smooth_scene
 from deferred_ir.base.errors import DeviceError
 from deferred_ir.engine.accumulation import Accumulation
 from deferred_ir.engine.record import Record
-from deferred_ir.gl.textures import FORMATS, GpuTexture
+from deferred_ir.gl.formats import FORMATS
+from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.ports import Texture
 from deferred_ir.profiling.studies import left_out
 from deferred_ir.report import left_out as savings

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools
-from deferred_ir.gl.textures import GpuBuffer
+from deferred_ir.gl.buffers import GpuBuffer
 from deferred_ir.scene.lights.spot import LIGHT
 from deferred_ir.viewer.canvas import Area
 from deferred_ir.viewer.session import Session

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from deferred_ir.gl.textures import GpuBuffer, GpuTexture
+from deferred_ir.gl.buffers import GpuBuffer
+from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.graph import Step
 from deferred_ir.viewer.canvas import Area, Canvas
 from deferred_ir.viewer.session import Session

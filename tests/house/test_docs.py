@@ -16,7 +16,7 @@ from PIL import Image
 from deferred_ir.cli import main
 from deferred_ir.graph.file import load_graph
 from deferred_ir.loading import scene_file
-from deferred_ir.loading.load import load
+from deferred_ir.loading.load import builtin_scenes, load
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
@@ -25,6 +25,8 @@ import pass_tables
 import pictures
 
 PAGES = pages.pages()
+PLACEHOLDERS = {"room.glb"}
+"""Scenes in commands that stand for a file of the reader's own, as the page says."""
 COMMAND = re.compile(r"^ *(?:\$ )?(deferred-ir .*)$", re.MULTILINE)
 EXAMPLE = pages.ROOT / "docs" / "adding-a-pass.md"
 SHOWN = [
@@ -65,6 +67,13 @@ def test_commands_are_understood(page):
             main._parse(words[1:])
         except SystemExit:
             pytest.fail(f"{page.name}: {line}")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=by_name)
+def test_scenes_in_commands_are_built_in_or_on_a_page(page):
+    known = {*(name for name, _ in builtin_scenes()), *PLACEHOLDERS, *(block.file for _, block in FILES)}
+    options = [main._parse(words[1:]) for words, _ in pages.commands(page)]
+    assert {scene for found in options if (scene := getattr(found, "scene", None))} <= known
 
 
 @pytest.mark.parametrize("shown", SHOWN, ids=lambda shown: " ".join(shown[1]))

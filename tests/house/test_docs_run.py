@@ -1,4 +1,4 @@
-"""What the pages tell to type runs, small and on the software device; each picture is made by a command."""
+"""The commands on the pages run, at small sizes on the software device; each picture is made by a command."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ BUILTIN = [words for words in RENDERS if words[2] in ("cornell", "colors", "atri
 
 
 def small(words: tuple[str, ...]) -> list[str]:
-    """The arguments of a command with 32x32 pixels, a light or none, and two frames at most."""
+    """The arguments of a command, reduced to 32x32 pixels, at most one VPL and at most two frames."""
     arguments = list(words[1:])
     for option, value in (("--size", "32x32"), ("--vpls", "1"), ("--frames", "2")):
         if option not in arguments:

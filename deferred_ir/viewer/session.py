@@ -314,8 +314,8 @@ class Session:
         counts = [getattr(step.work.params, "bounces", 1) for step in self.plan.steps]
         return max(counts)
 
-    def kept_motions(self) -> tuple[Camera, Spotlight]:
-        """Eye and light as a scene file should have them: with their motions if they are where those begin."""
+    def choose_motions(self) -> tuple[Camera, Spotlight]:
+        """Return eye and light as a scene file should have them: with their motions if they are where those begin."""
         start = self.scene.at(0.0)
         camera, light = self.eye, self.spotlight
         if camera == replace(start.camera, motion=None):

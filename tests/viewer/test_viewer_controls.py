@@ -254,7 +254,7 @@ def test_a_second_picture_gets_a_name_of_its_own(viewer, tmp_path, monkeypatch):
 def test_a_name_with_brackets_is_not_written_over(tmp_path):
     """To a search for files they are a pattern."""
     (tmp_path / "hall[2]-1.png").touch()
-    assert saving._free(tmp_path, "hall[2]") == "hall[2]-2"
+    assert saving._find_free_stem(tmp_path, "hall[2]") == "hall[2]-2"
 
 
 def test_a_recorded_way_is_saved_and_plays(viewer, tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -286,10 +287,7 @@ def test_shaders_and_graphs_are_read_again_and_a_broken_edit_keeps_the_picture(v
     monkeypatch.setattr(file_watch, "PERIOD", 0.0)
     source = shaders.package_shaders()
     folder = tmp_path / "shaders"
-    (folder / "lib").mkdir(parents=True)
-    for file in source.rglob("*.*"):
-        if file.suffix in (".frag", ".vert", ".geom", ".glsl", ".tesc", ".tese"):
-            (folder / file.relative_to(source)).write_text(file.read_text())
+    shutil.copytree(source, folder)
     for module in (shaders, file_watch):
         monkeypatch.setattr(module, "package_shaders", lambda: folder)
     graph = tmp_path / "mine.toml"

@@ -1,48 +1,48 @@
-"""What the measurements share: a row of panels, and files that are the same for the same figures."""
+"""Timing in turns: variants alternate frame by frame, so that a noisy machine disturbs all of them alike."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-from typing import Any
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from typing import TypeVar
 
-from deferred_ir.base.files import write_whole
+from deferred_ir.base.progress import track
+from deferred_ir.engine.record import Record
+from deferred_ir.engine.renderer import Renderer
+from deferred_ir.graph.graph import Plan
+from deferred_ir.scene.scene import Scene
 
-
-def arguments(doc: str | None, output: bool = True) -> argparse.ArgumentParser:
-    """A parser that takes scenes and, if it writes files, their folder; its help is the first line of `doc`."""
-    parser = argparse.ArgumentParser(description=(doc or "").splitlines()[0])
-    parser.add_argument("scenes", nargs="+", metavar="SCENE")
-    if output:
-        parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    return parser
+Item = TypeVar("Item")
+Name = TypeVar("Name", bound=Hashable)
 
 
-def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table."""
-    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows))
+def take_turns(items: Sequence[Item], turns: int, label: str = "") -> Iterator[tuple[int, Item]]:
+    """Yield (turn, item) for each item in each turn, with a progress bar.
+
+    Every other turn goes backwards, which evens out a steady drift.
+    """
+    for turn in track(range(turns), label):
+        for item in items if turn % 2 == 0 else reversed(items):
+            yield turn, item
 
 
-@contextmanager
-def panels(names: Iterable[str], path: Path, y_label: str = "", share_y: bool = False) -> Iterator[list[Any]]:
-    """Matplotlib axes in a row, one for each name; written as SVG at the end, lines with a grid and a legend."""
-    import matplotlib as mpl
+def time_frames(
+    scene: Scene,
+    renderers: Mapping[Name, Renderer],
+    plans: Mapping[Name, Plan],
+    turns: int,
+    *,
+    label: str = "",
+    new_seeds: bool = False,
+) -> dict[Name, Record]:
+    """Draw `turns` frames with each renderer, in turns. Returns their measurements.
 
-    mpl.use("svg")
-    mpl.rcParams["svg.hashsalt"] = path.name
-    import matplotlib.pyplot as plt
-
-    titles = list(names)
-    figure, axes = plt.subplots(1, len(titles), figsize=(4.2 * len(titles), 3.8), sharey=share_y, squeeze=False)
-    yield list(axes[0])
-    for panel, title in zip(axes[0], titles, strict=True):
-        panel.set_title(title)
-        if panel.get_legend_handles_labels()[0]:
-            panel.grid(alpha=0.3)
-            panel.legend(fontsize=7)
-    axes[0][0].set_ylabel(y_label)
-    figure.tight_layout()
-    write_whole(path, lambda part: figure.savefig(part, format="svg", metadata={"Date": None}))
-    plt.close(figure)
+    A first frame of each is not measured: it compiles and allocates. new_seeds: each turn has a seed of its own.
+    """
+    measurements = {name: Record() for name in renderers}
+    for name, renderer in renderers.items():
+        renderer.draw(scene, plans[name])
+    for turn, name in take_turns(list(renderers), turns, label):
+        renderers[name].draw(scene, plans[name], seed=turn if new_seeds else 0, record=measurements[name])
+    for name, renderer in renderers.items():
+        renderer.finish(measurements[name])
+    return measurements

@@ -24,7 +24,7 @@ from typing import Any
 import deferred_ir as ir
 from deferred_ir.base.progress import progress_bar
 from deferred_ir.engine.record import Record
-from deferred_ir.profiling.measure import markdown
+from deferred_ir.profiling.figures import markdown
 from deferred_ir.scene.motion import FRAMES_PER_SECOND, LissajousMotion
 from deferred_ir.scene.scene import Scene
 

@@ -1,15 +1,14 @@
-"""How far from the limits: passes against the least that they must do, deferred against forward, and Python's share.
+"""Measure how far the renderer is from its limits: passes, deferred against forward, and Python's own time.
 
     python -m deferred_ir.profiling.limits.bench cornell atrium colors --vpls 64 --size 512x512 --turns 11
 
-What is held against each other takes turns, frame by frame or process by process, so that a noisy machine disturbs
-both alike; each turn gives a ratio, and the table has their median and quartiles. Passes are measured by GPU time,
-frames by wall time. `--only` takes the rows whose name contains a word: `--only lighting`.
+The two sides of a comparison take turns, frame by frame or process by process, so that a noisy machine disturbs both
+alike; each turn gives a ratio, and the table shows the median and quartiles of the ratios. Passes are measured by GPU
+time, frames by wall time. `--only` selects the rows whose name contains a word: `--only lighting`.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import platform
 import sys
@@ -21,15 +20,15 @@ from statistics import median, quantiles
 from typing import Any
 
 from deferred_ir.base.errors import Error
-from deferred_ir.base.image_size import parse_size
-from deferred_ir.base.progress import track
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.gl.context import Gpu
 from deferred_ir.loading.load import load
+from deferred_ir.profiling.figures import markdown
 from deferred_ir.profiling.limits.host_costs import cold_start, python_time
 from deferred_ir.profiling.limits.passes import FOLDER, LIMITS
-from deferred_ir.profiling.measure import markdown
+from deferred_ir.profiling.measure import time_frames
+from deferred_ir.profiling.study import command_line
 from deferred_ir.scene.scene import Scene
 
 GRAPHS: Mapping[str, str | Path] = {
@@ -40,7 +39,7 @@ GRAPHS: Mapping[str, str | Path] = {
 
 @dataclass(frozen=True)
 class Comparison:
-    """How often `under` fits into `over`: each a graph and what of it, as `times` takes it."""
+    """A ratio of two times; each is a graph and a quantity of `times`."""
 
     over: tuple[str, str]
     under: tuple[str, str]
@@ -58,11 +57,10 @@ HOST: Mapping[str, Callable[..., list[float]]] = {
 }
 
 
-def take_turns(
+def time_graphs(
     scene: Scene, graphs: Sequence[str], *, vpls: int, size: tuple[int, int], turns: int, device: str
 ) -> dict[str, Record]:
-    """Times of `turns` frames of each graph; every other turn goes backwards, which evens out a steady drift."""
-    records = {graph: Record() for graph in graphs}
+    """Draw `turns` frames of each graph, in turns, a new seed in each turn. Returns their measurements."""
     with ExitStack() as stack:
         renderers = {
             graph: stack.enter_context(Renderer(size, GRAPHS[graph], device, passes=LIMITS, keep_all=True))
@@ -72,64 +70,56 @@ def take_turns(
             graph: renderer.plan(scene, vpls, [name for name in renderer.graph().outputs if name != "display"])
             for graph, renderer in renderers.items()
         }
-        for graph, renderer in renderers.items():
-            renderer.draw(scene, plans[graph])
-        for turn in track(range(turns), scene.name):
-            for graph in graphs if turn % 2 == 0 else reversed(graphs):
-                renderers[graph].draw(scene, plans[graph], seed=turn, record=records[graph])
-        for graph, renderer in renderers.items():
-            renderer.finish(records[graph])
-    return records
+        return time_frames(scene, renderers, plans, turns, label=scene.name, new_seeds=True)
 
 
-def times(record: Record, what: str) -> list[float]:
-    """Milliseconds of each frame: wall time of the `frame`, or less its shadow maps (`shading`), or a pass's on GPU."""
-    if what == "frame":
-        return record.frame_ms
-    if what == "shading":
-        return [frame - laps["shadow_maps"][0] for frame, laps in zip(record.frame_ms, record.laps, strict=True)]
-    return [laps[what][0] for laps in record.laps]
+def times(measured: Record, quantity: str) -> list[float]:
+    """Return the milliseconds of each frame.
+
+    quantity: `frame` (wall time), `shading` (wall time without the shadow maps) or a pass (GPU time).
+    """
+    if quantity == "frame":
+        return measured.frame_ms
+    if quantity == "shading":
+        return [frame - laps["shadow_maps"][0] for frame, laps in zip(measured.frame_ms, measured.laps, strict=True)]
+    return [laps[quantity][0] for laps in measured.laps]
 
 
 def spread(values: Sequence[float]) -> str:
-    """Median and quartiles with three digits."""
+    """Return median and quartiles with three digits."""
     low, _, high = quantiles(values, n=4, method="inclusive")
     return f"{digits(median(values))} ({digits(low)} to {digits(high)})"
 
 
 def digits(value: float) -> str:
-    """Three significant digits, never as a power of ten."""
+    """Format with three significant digits, never as a power of ten."""
     return f"{value:.0f}" if abs(value) >= 99.95 else f"{value:#.3g}"
 
 
 def column(name: str, rows: Sequence[str], **options: Any) -> list[str]:
-    """The cells of a scene; the medians behind its ratios go to the standard error."""
+    """Measure a scene. Returns its cells of the table; the medians behind its ratios go to standard error."""
     scene, cells = load(name), [name]
     chosen = [COMPARISONS[row] for row in rows if row in COMPARISONS]
     used = {graph for comparison in chosen for graph, _ in (comparison.over, comparison.under)}
-    records = take_turns(scene, [graph for graph in GRAPHS if graph in used], **options) if used else {}
+    measured = time_graphs(scene, [graph for graph in GRAPHS if graph in used], **options) if used else {}
     for row in rows:
         if row in HOST:
             values = HOST[row](name, **options)
         else:
-            comparison = COMPARISONS[row]
-            over, under = (times(records[graph], what) for graph, what in (comparison.over, comparison.under))
+            sides = COMPARISONS[row].over, COMPARISONS[row].under
+            over, under = (times(measured[graph], quantity) for graph, quantity in sides)
             values = [a / b for a, b in zip(over, under, strict=True)]
             print(f"{name}: {row}: {median(over):.1f} / {median(under):.1f} ms", file=sys.stderr)
         cells.append(spread(values))
     return cells
 
 
-def report(arguments: Sequence[str] | None = None) -> str:
-    """The table in Markdown, and how it was made."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("scenes", nargs="+", metavar="SCENE")
-    parser.add_argument("--vpls", type=int, default=64)
-    parser.add_argument("--size", type=parse_size, default=(512, 512))
+def report(words: Sequence[str] | None = None) -> str:
+    """Measure what the command line asks for. Returns the table in Markdown, and a line on how it was measured."""
+    parser = command_line(__doc__, vpls=64, size=(512, 512), device="auto")
     parser.add_argument("--turns", type=int, default=11, choices=range(2, 1000), metavar="N")
-    parser.add_argument("--device", default="auto")
     parser.add_argument("--only", default="", metavar="WORD", help="rows whose name contains it")
-    chosen = parser.parse_args(arguments)
+    chosen = parser.parse_args(words)
     rows = [row for row in (*COMPARISONS, *HOST) if chosen.only in row]
     if not rows:
         parser.error(f"--only {chosen.only}: in none of: {'; '.join((*COMPARISONS, *HOST))}")
@@ -139,11 +129,11 @@ def report(arguments: Sequence[str] | None = None) -> str:
     gpu.close()
     columns = [column(name, rows, **options) for name in chosen.scenes]
     head, *body = zip(["", *rows], *columns, strict=True)
-    made = (
+    conditions = (
         f"{device}; {os.cpu_count()} cores, Python {platform.python_version()}. {chosen.turns} turns with "
         f"{chosen.vpls} VPLs at {chosen.size[0]}x{chosen.size[1]}; median (quartiles)."
     )
-    return f"{markdown(head, body)}\n\n{made}"
+    return f"{markdown(head, body)}\n\n{conditions}"
 
 
 def main() -> None:

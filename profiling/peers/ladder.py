@@ -53,7 +53,7 @@ class Course:
         return PeerKey(self.scene.hash, list(self.size), self.bounces, peer, spp, seed)
 
 
-def chosen(text: str | None) -> Sequence[str]:
+def choose(text: str | None) -> Sequence[str]:
     """The peers of `--peers A,B|none`, all without it; SettingError for a name that is none's."""
     if text is None:
         return NAMES

@@ -1,14 +1,16 @@
-"""What parameters of the graph `accurate` cost and bring: rays of the near field, clamp, candidates, visibility.
+"""Measure what parameters of the graph `accurate` cost and gain: near-field rays, clamp, candidates, visibility.
 
     python -m deferred_ir.profiling.studies.accurate cornell colors atrium
 
-Each row is one setting, all others as they come. Settings take turns in one process, so that what else the machine does
-meets all alike. Truth is path-traced (`--spp`), or `--reference F.npz` with arrays image and hit, for one scene.
+Each row changes one parameter and leaves the others at their defaults. The settings take turns in one process, so that
+a noisy machine disturbs them alike. The reference is path-traced (`--spp`), or `--reference F.npz` with the arrays
+image and hit, for one scene.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from math import sqrt
@@ -16,15 +18,16 @@ from typing import Any
 
 import numpy as np
 
-from deferred_ir.base.errors import Error
-from deferred_ir.base.image_size import parse_size
-from deferred_ir.base.progress import track
+from deferred_ir.base.errors import SettingError
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import Renderer
+from deferred_ir.graph.graph import Plan
 from deferred_ir.loading.load import load
+from deferred_ir.profiling.figures import markdown
+from deferred_ir.profiling.measure import take_turns
+from deferred_ir.profiling.study import command_line, read_or_trace, run
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
-from deferred_ir.truth.reference import reference
 
 SAMPLES = 0.25, 1.0, 4.0, 16.0
 FACTORS = 0.16, 0.32, 0.64, 1.28
@@ -32,21 +35,21 @@ CANDIDATES = 1, 4, 16, 64
 VISIBILITY = "maps", "rays"
 TABLES = "samples", "clamp", "candidates", "visibility"
 PASS = {"samples": "near_field", "candidates": "vpl"}
-"""The pass whose time a table tells besides the frame's."""
+"""The pass whose time a table shows besides the frame's."""
 
 
 @dataclass
-class Run:
-    """One setting: its renderer, its plan, and what was found; errors has one relMSE a seed."""
+class Variant:
+    """One setting and its measurements. errors: one relMSE a seed."""
 
     renderer: Renderer
-    plan: Any
-    record: Record = field(default_factory=Record)
+    plan: Plan
+    times: Record = field(default_factory=Record)
     errors: list[float] = field(default_factory=list)
 
 
 def settings(table: str, vpls: int) -> dict[str, dict[str, Any]]:
-    """What `--set` would be told, by the names of the rows."""
+    """Return the settings of a table's rows by the rows' names, as `--set` takes them."""
     tables: dict[str, dict[str, dict[str, Any]]] = {
         "samples": {f"{n:g}": {"near_field.samples": n} for n in SAMPLES},
         "clamp": {f"{f:g} / sqrt(N)": {"vpl.clamp": f / sqrt(vpls)} for f in FACTORS},
@@ -56,71 +59,51 @@ def settings(table: str, vpls: int) -> dict[str, dict[str, Any]]:
     return tables[table]
 
 
-def measure(
-    scene: Scene, image: np.ndarray, hit: np.ndarray, table: str, *, size: tuple[int, int], vpls: int, seeds: int
-) -> dict[str, Run]:
-    """Draw `seeds` frames by each setting, in turns."""
+def measure(scene: Scene, truth: Mapping[str, Any], table: str, chosen: argparse.Namespace) -> dict[str, Variant]:
+    """Draw a frame of each seed with each setting, in turns. Returns the variants by the names of the rows."""
     with ExitStack() as stack:
-        runs = {}
-        for name, chosen in settings(table, vpls).items():
-            renderer = stack.enter_context(Renderer(size, "accurate", set=chosen))
-            runs[name] = Run(renderer, renderer.plan(scene, vpls, ["radiance"]))
-            renderer.draw(scene, runs[name].plan, seed=seeds)  # compiles, allocates: not what a frame costs
-        for seed in track(range(seeds), f"{scene.name}, {table}"):
-            for run in runs.values():
-                run.renderer.draw(scene, run.plan, seed=seed, record=run.record)
-                run.errors.append(relmse(run.renderer.read(run.plan).radiance, image, hit)[0])
-        for run in runs.values():
-            run.renderer.finish(run.record)
-    return runs
+        variants = {}
+        for name, changed in settings(table, chosen.vpls).items():
+            renderer = stack.enter_context(Renderer(chosen.size, "accurate", set=changed))
+            variants[name] = Variant(renderer, renderer.plan(scene, chosen.vpls, ["radiance"]))
+            renderer.draw(scene, variants[name].plan, seed=chosen.seeds)  # compiles and allocates: is not measured
+        for seed, variant in take_turns(list(variants.values()), chosen.seeds, f"{scene.name}, {table}"):
+            variant.renderer.draw(scene, variant.plan, seed=seed, record=variant.times)
+            image = variant.renderer.read(variant.plan).radiance
+            variant.errors.append(relmse(image, truth["image"], truth["hit"])[0])
+        for variant in variants.values():
+            variant.renderer.finish(variant.times)
+    return variants
 
 
-def row(scene: str, table: str, name: str, run: Run) -> str:
-    """A line of a Markdown table; times are the least of all seeds, which other work on the machine moves least."""
-    errors = f"{np.mean(run.errors):.5f} ({min(run.errors):.5f} to {max(run.errors):.5f})"
-    record = run.record
-    part = [f"{min(max(laps[PASS[table]]) for laps in record.laps):.0f}"] if table in PASS else []
-    return " | ".join([f"| {scene}", name, errors, *part, f"{min(record.frame_ms):.0f} |"])
-
-
-def main() -> None:
-    """Print Markdown tables."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("scenes", nargs="+", metavar="SCENE")
-    parser.add_argument("--tables", type=lambda text: text.split(","), default=list(TABLES), metavar="A,B")
-    parser.add_argument("--vpls", type=int, default=256)
-    parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--size", type=parse_size, default=(256, 256))
-    parser.add_argument("--spp", type=int, default=1024)
-    parser.add_argument("--reference", metavar="F.npz")
-    chosen = parser.parse_args()
-    if unknown := set(chosen.tables) - set(TABLES):
-        parser.error(f"--tables: no '{min(unknown)}'; there are {', '.join(TABLES)}")
-    try:
-        report(chosen)
-    except Error as error:
-        raise SystemExit(str(error)) from None
+def row(scene: str, table: str, name: str, variant: Variant) -> Sequence[str]:
+    """Return the cells of a row. Times are the least of all seeds, which other work on the machine disturbs least."""
+    errors, times = variant.errors, variant.times
+    cells = [scene, name, f"{np.mean(errors):.5f} ({min(errors):.5f} to {max(errors):.5f})"]
+    if table in PASS:
+        cells.append(f"{min(max(laps[PASS[table]]) for laps in times.laps):.0f}")
+    return [*cells, f"{min(times.frame_ms):.0f}"]
 
 
 def report(chosen: argparse.Namespace) -> None:
-    """A table for each of the choices, a row for each scene and setting."""
-    truths = {}
-    for name in chosen.scenes:
-        scene = load(name)
-        if chosen.reference:
-            given = np.load(chosen.reference)
-            truths[name] = scene, given["image"], given["hit"]
-        else:
-            traced = reference(scene, chosen.size, spp=chosen.spp)
-            truths[name] = scene, traced.radiance, traced.hit
+    """Print each chosen table with a row for each scene and setting."""
+    if unknown := set(chosen.tables) - set(TABLES):
+        raise SettingError(f"--tables: no '{min(unknown)}'; there are {', '.join(TABLES)}")
+    scenes = [load(name) for name in chosen.scenes]
+    truths = [read_or_trace(scene, chosen) for scene in scenes]
     for table in chosen.tables:
-        part = [f"{PASS[table]}, ms"] if table in PASS else []
-        head = ["scene", table, "relMSE", *part, "frame, ms"]
-        print(f"\n| {' | '.join(head)} |\n" + "|---" * len(head) + "|")
-        for scene, image, hit in truths.values():
-            runs = measure(scene, image, hit, table, size=chosen.size, vpls=chosen.vpls, seeds=chosen.seeds)
-            for name, run in runs.items():
-                print(row(scene.name, table, name, run), flush=True)
+        head = ["scene", table, "relMSE", *([f"{PASS[table]}, ms"] if table in PASS else []), "frame, ms"]
+        rows = []
+        for scene, truth in zip(scenes, truths, strict=True):
+            variants = measure(scene, truth, table, chosen)
+            rows += [row(scene.name, table, name, variant) for name, variant in variants.items()]
+        print(f"\n{markdown(head, rows)}", flush=True)
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Run the study."""
+    parser = command_line(__doc__, tables=list(TABLES), vpls=256, seeds=5, size=(256, 256), spp=1024, reference=None)
+    run(parser, report, words)
 
 
 if __name__ == "__main__":

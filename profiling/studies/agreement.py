@@ -1,21 +1,23 @@
-"""Do the two references estimate the same integral? VPLs with perfect visibility against the path tracer, by blocks.
+"""Compare the two references, VPLs with ray-cast visibility and the path tracer: do they agree within their noise?
 
     python -m deferred_ir.profiling.studies.agreement cornell colors --size 128x128
 
-Both with the same clamp and cone, 16 scrambles of 1024 Sobol VPLs; blocks of 8x8 pixels whose difference is within
-three standard errors (of both) in all channels count as equal.
+Both use the same clamp and cone; the VPLs are 16 scrambles of 1024 Sobol points. Blocks of 8x8 pixels agree if their
+means differ by no more than three standard errors (of both) in each channel.
 """
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from deferred_ir.base.image_size import parse_size
 from deferred_ir.base.progress import track
 from deferred_ir.loading.load import load
-from deferred_ir.profiling.measure import arguments
+from deferred_ir.profiling.figures import markdown
+from deferred_ir.profiling.study import command_line, run
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.path_tracer import PathTracer
@@ -25,22 +27,23 @@ from deferred_ir.vpls.ray_sum import sum_radiance
 
 BLOCK = 8
 SCRAMBLES, COUNT, SPP = 16, 1024, 256
+HEAD = "scene", "blocks within 3 standard errors", "lit blocks", "indirect light, VPLs / paths"
 
 
 def blocks(image: np.ndarray) -> np.ndarray:
-    """Means of BLOCK x BLOCK pixels, (H / BLOCK, W / BLOCK, 3)."""
+    """Return the means of blocks of BLOCK x BLOCK pixels, (H / BLOCK, W / BLOCK, 3)."""
     height, width, channels = image.shape
     means: np.ndarray = image.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, channels).mean(axis=(1, 3))
     return means
 
 
 def measure(scene: Scene, size: tuple[int, int], clamp: float, fov: float) -> dict[str, Any]:
-    """Share of lit blocks that agree, how many there are, and the ratio of the mean indirect light."""
+    """Return the fraction of the lit blocks that agree, their number, and the ratio of the mean indirect light."""
     tracer = Tracer(scene)
     judge = PathTracer(scene, tracer, clamp=clamp, fov=fov)
     seen, traced = judge.seen(size), judge.estimate(size, SPP, seed=7)
     if traced.variance is None:
-        raise ValueError(f"{SPP} paths a pixel tell no variance")
+        raise ValueError(f"{SPP} paths a pixel are too few for a variance")
     limits, sums = VplLimits.from_angle(fov, clamp * scene.geometry.diagonal), []
     for seed in track(range(SCRAMBLES), scene.name):
         vpls = cast(scene.spotlight, tracer, COUNT, "sobol", seed)
@@ -56,18 +59,21 @@ def measure(scene: Scene, size: tuple[int, int], clamp: float, fov: float) -> di
     }
 
 
-def main() -> None:
-    """Print a Markdown table."""
-    parser = arguments(__doc__, output=False)
-    parser.add_argument("--size", type=parse_size, default=(256, 256), help="multiples of 8")
-    parser.add_argument("--clamp", type=float, default=0.02)
-    parser.add_argument("--fov", type=float, default=180.0)
-    chosen = parser.parse_args()
-    print("| scene | blocks within 3 standard errors | lit blocks | indirect light, VPLs / paths |\n|---|---|---|---|")
+def report(chosen: argparse.Namespace) -> None:
+    """Print a row for each scene."""
+    rows = []
     for name in chosen.scenes:
         scene = load(name)
-        found = measure(scene, chosen.size, chosen.clamp, chosen.fov)
-        print(f"| {scene.name} | {found['within']:.1%} | {found['blocks']} | {found['ratio']:.4f} |", flush=True)
+        result = measure(scene, chosen.size, chosen.clamp, chosen.fov)
+        rows.append([scene.name, f"{result['within']:.1%}", f"{result['blocks']}", f"{result['ratio']:.4f}"])
+    print(markdown(HEAD, rows))
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Run the study; sizes have to be multiples of BLOCK."""
+    parser = command_line(__doc__, size=(256, 256), fov=180.0)
+    parser.add_argument("--clamp", type=float, default=0.02, metavar="DIAGONALS", help="clamp distance")
+    run(parser, report, words)
 
 
 if __name__ == "__main__":

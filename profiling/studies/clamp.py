@@ -1,20 +1,23 @@
-"""Error against the clamp distance, for several numbers of VPLs: what the default of vpl.clamp rests on.
+"""Measure the error against the clamp distance for several numbers of VPLs: the basis for the default of vpl.clamp.
 
     python -m deferred_ir.profiling.studies.clamp -o out/clamp cornell colors atrium --fov 150
 
-VPLs with ray-cast visibility (so that no shadow map has a part in it) against a path-traced reference, relMSE trimmed,
-mean over seeds. Writes clamp.json and clamp.svg; needs the extra `report`.
+VPLs with ray-cast visibility, which keeps errors of shadow maps out, are compared with a path-traced reference: trimmed
+relMSE, mean over seeds. Writes clamp.json and clamp.svg; needs the extra `report`.
 """
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.files import write_json
 from deferred_ir.base.progress import progress_bar
 from deferred_ir.loading.load import load
-from deferred_ir.profiling.measure import arguments, panels
+from deferred_ir.profiling.figures import markdown, panels
+from deferred_ir.profiling.study import command_line, run
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
@@ -31,7 +34,7 @@ SPP = 1024
 
 
 def measure(scene: Scene, fov: float) -> dict[str, list[float]]:
-    """relMSE of each number of VPLs: a list over CLAMPS."""
+    """Return the relMSE for each number of VPLs, a list over CLAMPS."""
     tracer = Tracer(scene)
     judge = PathTracer(scene, tracer)
     truth = judge.estimate(SIZE, SPP)
@@ -51,7 +54,7 @@ def measure(scene: Scene, fov: float) -> dict[str, list[float]]:
 
 
 def plot(results: dict[str, Any], path: Path) -> None:
-    """A log-log panel for each scene."""
+    """Draw relMSE over the clamp distance, log-log, a panel for each scene."""
     with panels(results, path, "relMSE") as axes:
         for panel, errors in zip(axes, results.values(), strict=True):
             for count, line in errors.items():
@@ -61,25 +64,27 @@ def plot(results: dict[str, Any], path: Path) -> None:
 
 
 def table(results: dict[str, Any]) -> str:
-    """relMSE as a Markdown table."""
-    rows = ["| scene | VPLs | " + " | ".join(map(str, CLAMPS)) + " |", "|---" * (len(CLAMPS) + 2) + "|"]
-    for name, errors in results.items():
-        for count, line in errors.items():
-            rows.append(f"| {name} | {count} | " + " | ".join(f"{value:.4f}" for value in line) + " |")
-    return "\n".join(rows)
+    """Return relMSE as a Markdown table."""
+    rows = [
+        [name, count, *(f"{value:.4f}" for value in line)]
+        for name, errors in results.items()
+        for count, line in errors.items()
+    ]
+    return markdown(["scene", "VPLs", *map(str, CLAMPS)], rows)
 
 
-def main() -> None:
-    """Measure, write, print."""
-    parser = arguments(__doc__)
-    parser.add_argument("--fov", type=float, default=150.0, help="of the VPLs' cones, degrees")
-    chosen = parser.parse_args()
-    chosen.output.mkdir(parents=True, exist_ok=True)
+def report(chosen: argparse.Namespace) -> None:
+    """Measure each scene, write the files and print the table."""
     results = {(scene := load(name)).name: measure(scene, chosen.fov) for name in chosen.scenes}
     settings = {"clamps": CLAMPS, "fov": chosen.fov, "seeds": SEEDS, "size": SIZE}
     write_json(chosen.output / "clamp.json", {**settings, "relmse": results})
     plot(results, chosen.output / "clamp.svg")
     print(table(results))
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Run the study."""
+    run(command_line(__doc__, output=True, fov=150.0), report, words)
 
 
 if __name__ == "__main__":

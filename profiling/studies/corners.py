@@ -1,50 +1,49 @@
-"""A corner of the Cornell box by clamped VPLs, with what the clamp took given back, and by rays.
+"""Show a corner of the Cornell box by clamped VPLs, with the clamp residual added back, and ray-traced.
 
     python -m deferred_ir.profiling.studies.corners -o out/corners
 
-Means of many frames: what is left of the difference is the clamp's, not chance.
+The images are means of many frames, so that the remaining difference is the clamp's and not noise.
 """
 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
-from deferred_ir.profiling.measure import panels
+from deferred_ir.profiling.figures import picture_panels
+from deferred_ir.profiling.study import command_line, run
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.reference import reference
 
 SIZE = 256, 256
 CROP = slice(150, 250), slice(60, 190)
-"""Rows and columns: the foot of both boxes, and the floor between them."""
+"""Rows and columns of the pictures: the foot of both boxes and the floor between them."""
 VPLS, FRAMES, SPP = 64, 32, 1024
 SETTINGS = {"vpl.fov": 179.9, "vpl.clamp": 0.08, "shadow_maps.projection": "paraboloid"}
 
 
-def main() -> None:
-    """Draw, print how bright each is."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    folder = parser.parse_args().output
-    folder.mkdir(parents=True, exist_ok=True)
+def report(chosen: argparse.Namespace) -> None:
+    """Draw the pictures, and print each one's brightness and error."""
     scene, images = load("cornell"), {}
-    for name, graph in (("clamped", "interleaved"), ("near field given back", "accurate")):
+    for name, graph in (("clamped", "interleaved"), ("residual added back", "accurate")):
         with Renderer(SIZE, graph, set=SETTINGS) as renderer:
             images[name] = renderer.render(scene, vpls=VPLS, accumulate=FRAMES).radiance
     images["ray-traced"] = reference(scene, SIZE, spp=SPP).radiance
     crops = {name: image[CROP] for name, image in images.items()}
-    white = np.quantile(crops["ray-traced"], 0.9)
-    with panels(crops, folder / "corners.svg") as axes:
-        for panel, crop in zip(axes, crops.values(), strict=True):
-            panel.imshow(np.clip(crop / white, 0, 1) ** (1 / 2.2), interpolation="none")
-            panel.set_axis_off()
+    white = float(np.quantile(crops["ray-traced"], 0.9))
+    picture_panels(crops, white, chosen.output / "corners.svg")
     truth = crops["ray-traced"].mean()
     for name, crop in crops.items():
         print(f"{name}: {crop.mean() / truth:.3f} of the light, relMSE {relmse(crop, crops['ray-traced'])[0]:.4f}")
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Run the study."""
+    run(command_line(__doc__, scenes=False, output=True), report, words)
 
 
 if __name__ == "__main__":

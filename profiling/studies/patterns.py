@@ -1,13 +1,15 @@
-"""Error against the number of VPLs for the four sample patterns, with fitted slopes.
+"""Measure the error against the number of VPLs for the four sample patterns, with fitted slopes.
 
     python -m deferred_ir.profiling.studies.patterns -o out/patterns cornell colors atrium
 
-Each image is held against the limit of the same graph (same maps, same clamp) as the number of VPLs grows: the mean of
-many seeds, so that only the sampling error is left. Writes patterns.json and patterns.svg; needs the extra `report`.
+Each image is compared with the mean of many seeds of the same graph with many VPLs (same maps, same clamp), so that
+only the sampling error is left. Writes patterns.json and patterns.svg; needs the extra `report`.
 """
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,8 @@ from deferred_ir.base.files import write_json
 from deferred_ir.base.progress import ProgressBar, progress_bar
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
-from deferred_ir.profiling.measure import arguments, panels
+from deferred_ir.profiling.figures import markdown, panels
+from deferred_ir.profiling.study import command_line, run
 from deferred_ir.sampling.patterns import PATTERNS
 from deferred_ir.scene.scene import Scene
 
@@ -28,7 +31,7 @@ LIMIT_COUNT, LIMIT_SEEDS = 1024, 32
 
 
 def _images(scene: Scene, pattern: str, count: int, seeds: range, bar: ProgressBar) -> np.ndarray:
-    """Radiance of each seed, float64 (seeds, H, W, 3)."""
+    """Render each seed. Returns radiance, float64 (seeds, H, W, 3)."""
     images = []
     with Renderer(SIZE, set={"vpl.pattern": pattern}) as renderer:
         plan = renderer.plan(scene, count, ["radiance"])
@@ -40,10 +43,10 @@ def _images(scene: Scene, pattern: str, count: int, seeds: range, bar: ProgressB
 
 
 def measure(scene: Scene) -> dict[str, Any]:
-    """RMSE over the mean of the limit, for each pattern, count and seed; and the slope of its mean in log-log."""
+    """Return RMSE over the limit's mean for each pattern, count and seed, and the log-log slope of its mean."""
     total = LIMIT_COUNT * LIMIT_SEEDS + len(PATTERNS) * SEEDS * sum(COUNTS)
     with progress_bar(scene.name, total) as bar:
-        # Seeds of the limit are none of those that are held against it.
+        # The limit's seeds are different from those compared with it.
         limits = _images(scene, "sobol", LIMIT_COUNT, range(1000, 1000 + LIMIT_SEEDS), bar)
         limit = limits.mean(axis=0)
         noise = np.sqrt(((limits - limit) ** 2).mean() / (LIMIT_SEEDS - 1))
@@ -62,7 +65,7 @@ def measure(scene: Scene) -> dict[str, Any]:
 
 
 def plot(results: dict[str, Any], path: Path) -> None:
-    """A log-log panel for each scene: mean over seeds, and a band from the smallest to the largest."""
+    """Draw a log-log panel for each scene: the mean over seeds, and a band from the smallest to the largest."""
     with panels(results, path, "RMSE / mean radiance", share_y=True) as axes:
         for panel, result in zip(axes, results.values(), strict=True):
             for pattern, data in result["patterns"].items():
@@ -78,23 +81,26 @@ def plot(results: dict[str, Any], path: Path) -> None:
 
 
 def table(results: dict[str, Any]) -> str:
-    """The mean errors as a Markdown table."""
-    rows = ["| scene | pattern | " + " | ".join(map(str, COUNTS)) + " | slope |", "|---" * (len(COUNTS) + 3) + "|"]
-    for name, result in results.items():
-        for pattern, data in result["patterns"].items():
-            means = " | ".join(f"{value:.4f}" for value in np.mean(data["errors"], axis=1))
-            rows.append(f"| {name} | {pattern} | {means} | {data['slope']:.2f} |")
-    return "\n".join(rows)
+    """Return the mean errors as a Markdown table."""
+    rows = [
+        [name, pattern, *(f"{value:.4f}" for value in np.mean(data["errors"], axis=1)), f"{data['slope']:.2f}"]
+        for name, result in results.items()
+        for pattern, data in result["patterns"].items()
+    ]
+    return markdown(["scene", "pattern", *map(str, COUNTS), "slope"], rows)
 
 
-def main() -> None:
-    """Measure, write, print."""
-    chosen = arguments(__doc__).parse_args()
-    chosen.output.mkdir(parents=True, exist_ok=True)
+def report(chosen: argparse.Namespace) -> None:
+    """Measure each scene, write the files and print the table."""
     results = {(scene := load(name)).name: measure(scene) for name in chosen.scenes}
     write_json(chosen.output / "patterns.json", {"counts": COUNTS, "seeds": SEEDS, "size": SIZE, "scenes": results})
     plot(results, chosen.output / "patterns.svg")
     print(table(results))
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Run the study."""
+    run(command_line(__doc__, output=True), report, words)
 
 
 if __name__ == "__main__":

@@ -69,7 +69,7 @@ class _Lattice:
         return _Lattice(*(value[rows, columns] for value in vars(self).values()))
 
 
-def found(scene: Scene, size: tuple[int, int], progress: Progress | None = None) -> Mask:
+def find(scene: Scene, size: tuple[int, int], progress: Progress | None = None) -> Mask:
     """The mask of `scene` at time 0 for images of `size` (width, height). DeviceError without embreex."""
     scene = scene.at(0.0)
     tracer = Tracer(scene)
@@ -140,11 +140,11 @@ def _differ(one: _Lattice, other: _Lattice) -> Bools:
     return differ
 
 
-def made(folder: Path, scene: Scene, size: tuple[int, int], progress: Progress | None = None) -> Mask:
+def load_or_find(folder: Path, scene: Scene, size: tuple[int, int], progress: Progress | None = None) -> Mask:
     """The mask kept in `folder`, or a new one, kept there."""
     mask = read(folder, scene.hash, size)
     if mask is None:
-        mask = found(scene, size, progress)
+        mask = find(scene, size, progress)
         save(folder, mask, scene.hash)
     return mask
 

@@ -52,7 +52,7 @@ class Truth:
         return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
-def given(path: Path, scene: Scene, size: tuple[int, int], time: float = 0.0) -> Truth:
+def read(path: Path, scene: Scene, size: tuple[int, int], time: float = 0.0) -> Truth:
     """The reference at `path`, held by its record against scene, size and time; SettingError if they differ."""
     radiance = read_radiance(path)
     height, width, _ = radiance.shape
@@ -78,7 +78,7 @@ def given(path: Path, scene: Scene, size: tuple[int, int], time: float = 0.0) ->
     return Truth(radiance, record)
 
 
-def made(
+def load_or_trace(
     folder: Path,
     scene: Scene,
     size: tuple[int, int],

@@ -105,7 +105,7 @@ class Sweep:
 
 def run(sweep: Sweep, folder: Path, reference: Path | None) -> tuple[list[Point], Peers]:
     """Measure what is not in `folder` yet; all points of the sweep's shard."""
-    truth = sweep_reference.given(reference, sweep.scene, sweep.size, sweep.time) if reference else None
+    truth = sweep_reference.read(reference, sweep.scene, sweep.size, sweep.time) if reference else None
     gpu = Gpu(sweep.device)
     device = gpu.device.name
     gpu.close()
@@ -116,7 +116,7 @@ def run(sweep: Sweep, folder: Path, reference: Path | None) -> tuple[list[Point]
             "device": device,
         }
         with progress_bar() as bar:
-            truth = sweep_reference.made(
+            truth = sweep_reference.load_or_trace(
                 folder,
                 sweep.moment,
                 sweep.size,
@@ -126,7 +126,7 @@ def run(sweep: Sweep, folder: Path, reference: Path | None) -> tuple[list[Point]
             )
     with progress_bar() as bar:
         bar.label("edges")
-        mask = edge_mask.made(folder, sweep.moment, sweep.size, bar.show)
+        mask = edge_mask.load_or_find(folder, sweep.moment, sweep.size, bar.show)
     done, ahead = dict[str, Point](), list[tuple[str, int, int]]()
     truth_hash = truth.hash
     for share in sweep.shares():

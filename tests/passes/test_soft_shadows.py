@@ -51,7 +51,7 @@ def test_the_penumbra_is_right_where_a_hard_shadow_is_wrong(renderer, fov, facto
 def test_a_penumbra_is_as_wide_as_the_edge_is_high(renderer, height, radius):
     """Of a straight edge, from a tenth of the disc to nine tenths: 0.687 of its diameter, by similar triangles."""
     scene = soft_shadows.edge(height, radius, fov=130.0)
-    found = soft_shadows.width(soft_shadows.shares(scene, device="software"), height, radius)
+    found = soft_shadows.width(soft_shadows.visibility(scene, device="software"), height, radius)
     texel = 2 * np.tan(np.radians(65)) / 2048
     # The hardware's comparison adds a texel.
     assert found == pytest.approx(0.687 * 2 * radius * height / (1 - height), rel=0.06, abs=1.5 * texel)

@@ -11,10 +11,10 @@ import pytest
 
 from deferred_ir.engine.record import Record
 from deferred_ir.loading.load import load
+from deferred_ir.profiling.figures import markdown
 from deferred_ir.profiling.limits import bench
 from deferred_ir.profiling.limits.host_costs import cold_start, python_time, seconds
 from deferred_ir.profiling.limits.passes import LIMITS
-from deferred_ir.profiling.measure import markdown
 from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))

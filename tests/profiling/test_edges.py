@@ -22,7 +22,7 @@ ABOVE = Spotlight((0.0, 4.0, 0.0), (0.0, 0.0, 0.0), 100.0)
 
 
 def kept(scene, size=SIZE):
-    return edges.found(scene, size).kept
+    return edges.find(scene, size).kept
 
 
 def on_floor(camera, size):
@@ -121,9 +121,9 @@ def test_facets_of_a_smooth_surface_are_no_edges_but_its_outline_is():
 
 def test_rows_at_once_do_not_show(monkeypatch):
     scene = build(plane(0.6), box((-0.2, 0, -0.2), (0.2, 0.3, 0.2)), camera=DOWN, spotlight=ABOVE)
-    whole = edges.found(scene, SIZE)
+    whole = edges.find(scene, SIZE)
     monkeypatch.setattr(edges, "ROWS", 7)
-    assert edges.found(scene, SIZE).hash == whole.hash
+    assert edges.find(scene, SIZE).hash == whole.hash
 
 
 @pytest.fixture

@@ -13,8 +13,8 @@ def test_it_prints_its_tables(monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["incremental", "colors"])
     measured.main()
     rows = [line.split(" | ") for line in capsys.readouterr().out.splitlines() if line.startswith("| colors")]
-    times, behind, errors = rows
-    assert len(behind) == len(measured.BEHIND)
+    times, lag, errors = rows
+    assert len(lag) == len(measured.LAG)
     assert len(times) == len(measured.TIMES)
     assert len(errors) == len(measured.ERRORS)
     assert int(times[-1].strip("| ")) <= 9

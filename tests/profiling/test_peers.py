@@ -269,9 +269,9 @@ def test_a_faulty_name_is_one_line(text, words, tmp_path, capsys):
 
 
 def test_names_of_peers():
-    assert peer_sweep.chosen(None) == peers.NAMES
-    assert peer_sweep.chosen("none") == ()
-    assert list(peer_sweep.chosen(" cycles,mitsuba,cycles")) == ["cycles", "mitsuba"]
+    assert peer_sweep.choose(None) == peers.NAMES
+    assert peer_sweep.choose("none") == ()
+    assert list(peer_sweep.choose(" cycles,mitsuba,cycles")) == ["cycles", "mitsuba"]
     assert main(["profile", "--merge", ".", "-o", "x", "--peers", "none"]) == 2
 
 

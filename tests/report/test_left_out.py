@@ -126,7 +126,7 @@ def test_the_table_holds_both_ways_together(monkeypatch, capsys):
     monkeypatch.setattr("sys.argv", ["left_out", "cornell", "--vpls", "4", "--turns", "1", "--device", "software"])
     left_out.main()
     head, _, *rows = capsys.readouterr().out.splitlines()
-    assert head.startswith("| scene | graph | frame [ms] | all kept |")
+    assert head.startswith("| scene | graph | frame [ms] | with all |")
     for graph, line in zip(("deferred", "interleaved"), rows, strict=True):
         assert line.startswith(f"| cornell | {graph} |")
         few, more = (float(cell) for cell in line.strip(" |").split(" | ")[-2:])

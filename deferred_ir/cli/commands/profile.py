@@ -74,7 +74,7 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> tuple[list[Point], 
 
     counts = _parse_vpls(VPLS if arguments.vpls is None else arguments.vpls)
     shard = _parse_shard(arguments.shard)
-    peers = ladder.chosen(arguments.peers)
+    peers = ladder.choose(arguments.peers)
     graphs = graph_names() if arguments.graphs is None else split_list(arguments.graphs)
     scene = load(arguments.scene)
     size = choose_size(arguments.size, scene.render)

@@ -13,10 +13,12 @@ import numpy as np
 
 from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_buffer import VplParams, output, packed
+from deferred_ir.frame.light_buffer import output, packed
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_params import VplParams
+from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
-from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Output
 from deferred_ir.vpls.cast import NONE
 from deferred_ir.vpls.incremental import IncrementalVpls
@@ -51,10 +53,10 @@ class IncrementalVpl(Pass):
             raise GraphError(f"least {self.params.least}: is more than most, {self.params.most}; give both")
         return {"lights": output(self.params.count)}
 
-    def informed(self, facts: Facts) -> Facts:
-        """Whether there will be VPLs, and a clamp."""
-        informed: Facts = self.params.informed(facts)
-        return informed
+    def state_facts(self, facts: Facts) -> Statements:
+        """State whether there may be VPLs, and whether they are clamped."""
+        stated: Statements = self.params.state_facts(facts)
+        return stated
 
     def frames_to_fill(self) -> int:
         """As many VPLs as there may be new ones in each."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -12,8 +12,10 @@ from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import in_order, shining_first
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_params import SHARES
+from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
-from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output
 from deferred_ir.vpls.interleaving import SharesMeta, deal, find_share_starts
 
@@ -41,9 +43,10 @@ class Interleave(Pass):
         defines = {"INTERLEAVE": n, "LIGHTS_PER_BLOCK": lights.block}
         return {"vpls": Output("the VPLs in the order of their shares", vpls, defines, meta=SharesMeta(n))}
 
-    def informed(self, facts: Facts) -> Facts:
-        """How the VPLs are dealt."""
-        return replace(facts, shares=self.params.n**2)
+    def state_facts(self, facts: Facts) -> Statements:
+        """State into how many shares the VPLs are dealt."""
+        del facts
+        return {SHARES: self.params.n**2}
 
     def unneeded(self, facts: Facts) -> str | None:
         """With one share there is nothing to deal."""

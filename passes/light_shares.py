@@ -12,7 +12,9 @@ from typing import ClassVar
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import last_shining
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.frame.vpl_params import VPLS
+from deferred_ir.graph.facts import Facts
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
 from deferred_ir.vpls.interleaving import SharesMeta, find_share_starts, find_sub_buffers
@@ -41,7 +43,7 @@ class Interleaved(Pass):
 
     def unneeded(self, facts: Facts) -> str | None:
         """Without VPLs there is no light to share."""
-        return None if facts.vpls else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
+        return None if facts[VPLS] else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
 
     def execute(self, frame: Frame, io: Io) -> None:
         """A draw for each share, or more where it crosses from block to block of the buffer."""

@@ -10,11 +10,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from deferred_ir.frame.facts import EMITS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_buffer import LightsMeta, read_limits
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_params import CLAMP_RETURNED, CLAMPED
+from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
-from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.vpls.clamp_residual import residual
 from deferred_ir.vpls.interleaving import SharesMeta
@@ -33,7 +36,6 @@ class NearField(Pass):
     """Irradiance that clamped VPLs miss, unfiltered."""
 
     Params = Params
-    gives_back = True
     inputs: ClassVar[Mapping[str, Input]] = {
         "lights": Input("the spotlight, then the VPLs: their clamp and cone", format="light"),
         "vpls": Input("the VPLs as dealt to pixels, whose blocks the rays' pattern shares", "share", optional=True),
@@ -47,11 +49,16 @@ class NearField(Pass):
         doc = "irradiance lost to the clamp; alpha: the pixel's weight, 0 where no ray was traced"
         return {"residual": Output(doc, Texture("rgba32f"), transient=True)}
 
+    def state_facts(self, facts: Facts) -> Statements:
+        """State that the light which the clamp takes is added."""
+        del facts
+        return {CLAMP_RETURNED: True}
+
     def unneeded(self, facts: Facts) -> str | None:
         """Without a clamp there is no residual, and without light none either."""
-        if not facts.emits:
+        if not facts[EMITS]:
             return "the spotlight emits nothing"
-        return None if facts.clamped else "nothing is clamped: vpl.clamp or vpl.count is 0"
+        return None if facts[CLAMPED] else "nothing is clamped: vpl.clamp or vpl.count is 0"
 
     def depends(self) -> frozenset[str]:
         """Rays from what the camera sees, which the light hits."""

@@ -13,9 +13,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from deferred_ir.frame.facts import EMITS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.facts import Facts
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 from deferred_ir.shadows import mesh_choice, paraboloid
@@ -57,7 +59,7 @@ class ShadowMaps(Pass):
 
     def unneeded(self, facts: Facts) -> str | None:
         """A dark spotlight makes no VPLs either."""
-        return None if facts.emits else "no light needs one: the spotlight emits nothing"
+        return None if facts[EMITS] else "no light needs one: the spotlight emits nothing"
 
     def depends(self) -> frozenset[str]:
         """The lights come as an input."""

@@ -13,11 +13,14 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from deferred_ir.frame.costs import estimate_map_cost, estimate_ray_cost
+from deferred_ir.frame.facts import EMITS, PIXELS, SOFTWARE, TRIANGLES
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_buffer import read_limits, read_vpls
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_params import SHARES
+from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
-from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.rays.direct import on_pixels
 from deferred_ir.vpls.interleaving import find_places, find_share_starts
@@ -60,12 +63,12 @@ class ShadowRays(Pass):
 
     def unneeded(self, facts: Facts) -> str | None:
         """Where maps are chosen, or cost less."""
-        if not facts.emits:
+        if not facts[EMITS]:
             return "the spotlight emits nothing"
         if self.params.visibility == "maps":
             return "visibility is 'maps'"
-        maps = estimate_map_cost(facts.triangles, software=facts.software)
-        rays = estimate_ray_cost(facts.pixels, facts.shares)
+        maps = estimate_map_cost(facts[TRIANGLES], software=facts[SOFTWARE])
+        rays = estimate_ray_cost(facts[PIXELS], facts[SHARES])
         if self.params.visibility == "rays" or rays < maps:
             return None
         return f"maps should take less time: {maps:.2g} ms for each VPL, rays {rays:.2g} ms"

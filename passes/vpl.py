@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_buffer import MapVersions, VplParams, output, packed
+from deferred_ir.frame.light_buffer import MapVersions, output, packed
 from deferred_ir.frame.light_culling import dropped, shining
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_params import CastParams
+from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
-from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Output
-from deferred_ir.sampling.patterns import Pattern, warn_unbalanced
+from deferred_ir.sampling.patterns import warn_unbalanced
 from deferred_ir.vpls.cast import NONE, Vpls, cast
 from deferred_ir.vpls.resampling import estimate_effects, find_probes, resample
 
 
 @dataclass(frozen=True)
-class Params(VplParams):
-    """Parameters of VPLs that are cast anew in each frame."""
+class Params(CastParams):
+    """Parameters of VPLs that are cast anew in each frame, among them how many candidates each is chosen from."""
 
-    pattern: Pattern = param("sobol", doc="Sample pattern on the disc of directions.")
-    bounces: int = param(1, lo=1, hi=64, doc="Diffuse bounces; each beyond the first adds VPLs.")
     candidates: int = param(
         1, lo=1, hi=64, doc="Rays for each VPL that is kept, chosen by what it adds to the image. 1: all are kept."
     )
@@ -46,10 +46,10 @@ class Vpl(Pass):
         del inputs
         return {"lights": output(self.params.count * self.params.bounces, self.params.bounces)}
 
-    def informed(self, facts: Facts) -> Facts:
-        """Whether there will be VPLs, and a clamp."""
-        informed: Facts = self.params.informed(facts)
-        return informed
+    def state_facts(self, facts: Facts) -> Statements:
+        """State whether there may be VPLs, and whether they are clamped."""
+        stated: Statements = self.params.state_facts(facts)
+        return stated
 
     def depends(self) -> frozenset[str]:
         """Where the light falls, and for a choice among candidates what the camera sees."""

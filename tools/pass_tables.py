@@ -13,11 +13,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from pages import ROOT, between
 
+from deferred_ir.frame.facts import TRIANGLES
 from deferred_ir.graph import file
 from deferred_ir.graph.compile import compile
+from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.graph import Step
 from deferred_ir.graph.params import specs
-from deferred_ir.graph.pass_base import Facts
 
 PAGE = ROOT / "docs" / "graph.md"
 BEGIN = "<!-- passes: written by tools/pass_tables.py -->"
@@ -27,7 +28,7 @@ END = "<!-- end of passes -->"
 def steps() -> dict[str, Step]:
     """For each type of pass, a step of a built-in graph that uses it."""
     found = {}
-    large = Facts(triangles=100_000)  # a scene in which no pass is left out
+    large = Facts({TRIANGLES: 100_000})  # a scene in which no pass is left out
     for name in sorted(file.graph_names(), key=lambda name: name != "deferred"):
         graph = file.load_graph(name)
         for step in compile(graph, list(graph.outputs), large).steps:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from numbers import Integral
 from pathlib import Path
 from types import TracebackType
@@ -17,7 +16,8 @@ from deferred_ir.base.errors import GraphError, SettingError
 from deferred_ir.engine.accumulation import Accumulation
 from deferred_ir.engine.executor import Executor
 from deferred_ir.engine.record import Record
-from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.facts import collect_facts
+from deferred_ir.frame.frame import PARTS, Frame
 from deferred_ir.frame.scene_buffers import SceneBuffers
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.devices import Loader
@@ -125,16 +125,12 @@ class Renderer:
         if not isinstance(scene, Scene):
             raise SettingError(f"scene: is {type(scene).__name__}, not a Scene; load it first: deferred_ir.load(...)")
         graph = self.graph(vpls)
-        known = replace(
-            scene.facts,
-            pixels=self.size[0] * self.size[1],
-            software=self.gpu.device.kind == "software",
-            keep_all=self._keep_all if keep_all is None else keep_all,
-        )
+        facts = collect_facts(scene, self.size, software=self.gpu.device.kind == "software")
+        keep_all = self._keep_all if keep_all is None else keep_all
         wanted = tuple(graph.outputs if outputs is None else outputs)
-        key = (vpls, known, wanted)
+        key = (vpls, facts, keep_all, wanted)
         if key not in self._plans:
-            plan = compile(graph, wanted, known)
+            plan = compile(graph, wanted, facts, keep_all=keep_all, parts=PARTS)
             _check_images(graph, plan)
             self._plans[key] = plan
         return self._plans[key]

@@ -51,22 +51,13 @@ class Runs:
 
 def _made_of(step: Step, io: Io, frame: Frame) -> tuple[Any, ...]:
     """What the outputs of a step follow from; two are equal only if the outputs are."""
-    scene = frame.scene
-    parts = {
-        "camera": (scene.camera, frame.size),
-        "light": scene.spotlight,
-        "models": (frame.buffers, scene.geometry, scene.materials, scene.textures),
-        "seed": frame.seed,
-        "time": frame.time,
-    }
-    named = tuple(parts[name] for name in sorted(step.work.depends()))
     return (
         type(step.work),
         step.work.params,
         tuple(io.defines.items()),
         tuple(io.metas.items()),
         _versions(io, step.work.inputs),
-        named,
+        frame.read_parts(step.work.depends()),
         frame.by_view,
     )
 

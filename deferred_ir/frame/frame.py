@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -52,6 +53,10 @@ class Frame:
     keep_all: bool = False
     _surfaces: dict[tuple[GpuTexture, GpuTexture], Surfaces] = field(default_factory=dict, init=False)
 
+    def read_parts(self, names: Collection[str] | None) -> tuple[Any, ...]:
+        """Return the values of the PARTS with these names, of all for None; equal ones make equal outputs."""
+        return tuple(read(self) for name, read in PARTS.items() if names is None or name in names)
+
     @property
     def by_view(self) -> bool:
         """Whether what this camera's view does not need may be left out: the next frame is drawn afresh."""
@@ -88,3 +93,18 @@ class Frame:
         # Axes are orthogonal, so dividing by the squared length inverts them; forward has length 1.
         record["clip"][:, :3] = rays / (rays**2).sum(axis=1, keepdims=True)
         return record.tobytes()
+
+
+PARTS: Mapping[str, Callable[[Frame], Any]] = {
+    "camera": lambda frame: (frame.scene.camera, frame.size),
+    "light": lambda frame: frame.scene.spotlight,
+    "models": lambda frame: (
+        frame.buffers,
+        frame.scene.geometry,
+        frame.scene.materials,
+        frame.scene.textures,
+    ),
+    "seed": lambda frame: frame.seed,
+    "time": lambda frame: frame.time,
+}
+"""The parts of a frame that a pass can name in `depends`, and how to read what each holds."""

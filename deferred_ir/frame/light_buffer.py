@@ -1,17 +1,15 @@
-"""The light buffer: the spotlight's record and then one for each VPL, and the parameters that all who fill it have."""
+"""The light buffer: the spotlight's record and then one for each VPL."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import sqrt
-from typing import Literal
 
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.versions import new_versions
-from deferred_ir.graph.params import param
-from deferred_ir.graph.pass_base import Facts
+from deferred_ir.frame.vpl_params import VplParams
 from deferred_ir.graph.ports import Buffer, Output
 from deferred_ir.scene.geometry import Geometry
 from deferred_ir.scene.lights.spot import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, fill_records
@@ -19,40 +17,8 @@ from deferred_ir.scene.scene import Scene
 from deferred_ir.vpls.cast import Vpls
 from deferred_ir.vpls.kernel import VplLimits
 
-AUTO_CLAMP = 0.64
-"""Clamp distance of one VPL in diagonals where short rays give back what it takes: best at 64 to 1024 VPLs of both a
-room and a cathedral, and flat about there (half or twice of it costs a tenth to a half of the error)."""
-
 ROUNDINGS = 8
 """Of a coordinate: what a VPL's surface and its map may be apart by, with positions and their products rounded."""
-
-
-@dataclass(frozen=True)
-class VplParams:
-    """Parameters of VPLs, wherever they come from."""
-
-    count: int = param(64, lo=0, hi=65536, doc="Rays that leave the spotlight; each that lands makes a VPL.")
-    fov: float = param(150.0, lo=1.0, hi=179.9, doc="Full opening angle of the cone a VPL shines into, degrees.")
-    clamp: float | Literal["auto"] = param(
-        0.02,
-        lo=0.0,
-        hi=10.0,
-        doc="Distance below which 1/d^2 is held, as a fraction of the scene's diagonal; auto: 0.64 / sqrt(count).",
-    )
-
-    @property
-    def clamp_fraction(self) -> float:
-        """The clamp distance in diagonals. auto: in proportion to the distance between VPLs, whose spikes it holds."""
-        return AUTO_CLAMP / sqrt(max(self.count, 1)) if self.clamp == "auto" else self.clamp
-
-    def limits(self, diagonal: float) -> VplLimits:
-        """Return cone and clamp of VPLs in a scene of this diagonal."""
-        return VplLimits.from_angle(self.fov, self.clamp_fraction * diagonal)
-
-    def informed(self, facts: Facts) -> Facts:
-        """Whether there will be VPLs, and a clamp that holds them."""
-        vpls = self.count > 0 and facts.emits
-        return replace(facts, vpls=vpls, clamped=vpls and self.clamp_fraction > 0)
 
 
 @dataclass(frozen=True)

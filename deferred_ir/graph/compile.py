@@ -1,4 +1,4 @@
-"""Turns a graph into a plan: resolve names, leave out, cull, order, describe, find lifetimes. Pure: no OpenGL.
+"""Compile a graph to a plan: resolve names, leave out, cull, order, describe, find lifetimes. Pure: no OpenGL.
 
 Ideas: all faults at once (Falcor), compilation as a short list of steps (Granite), culling by a backward walk and tests
 without a GPU (Filament).
@@ -6,42 +6,49 @@ without a GPU (Filament).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
+from typing import Any
 
 from deferred_ir.base.errors import GraphError, did_you_mean
+from deferred_ir.graph.facts import NOTHING_KNOWN, Fact, Facts
 from deferred_ir.graph.graph import Graph, Plan, Step
-from deferred_ir.graph.pass_base import FRAME_PARTS, Facts
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description
 
-ANY_SCENE = Facts()
-"""Of which nothing is known, so that nothing is left out."""
 
+def compile(
+    graph: Graph,
+    outputs: Sequence[str],
+    facts: Facts = NOTHING_KNOWN,
+    *,
+    keep_all: bool = False,
+    parts: Collection[str] | None = None,
+) -> Plan:
+    """Return the plan that produces `outputs` (names in graph.outputs) where `facts` hold.
 
-def compile(graph: Graph, outputs: Sequence[str], facts: Facts = ANY_SCENE) -> Plan:
-    """The plan that produces `outputs` (names in graph.outputs) for a scene with these facts.
-
+    keep_all: leave nothing out that another scene would need. parts: names that `Pass.depends` may give, None for any.
     Raises one GraphError that lists all faults.
     """
     faults: list[str] = []
     roots, edges = _resolve(graph, outputs, faults)
-    for node in graph.nodes.values():
-        facts = node.work.informed(facts)
-    unneeded = _leave_out(graph, edges, facts.kept)
+    known = _gather_facts({node.name: node.work for node in graph.nodes.values()}, facts, faults)
+    unneeded = _leave_out(graph, edges, known.forget_needs() if keep_all else known, faults)
     for name, (source, _) in roots.items():
         if source in unneeded:
             faults.append(f"output '{name}' comes from {source}, which is left out: {unneeded[source]}")
     reached = _reach(roots, edges, unneeded)
-    steps = _describe(graph, edges, _order(edges, reached, faults), faults)
+    steps = _describe(graph, edges, _order(edges, reached, faults), parts, faults)
     if faults:
-        told = " ".join("; ".join(faults).split())  # a name may hold a line break
-        raise GraphError(f"{graph.origin}: {told}")
+        text = " ".join("; ".join(faults).split())  # a name may hold a line break
+        raise GraphError(f"{graph.origin}: {text}")
     left_out = {name: unneeded.get(name, "no requested output needs it") for name in graph.nodes if name not in reached}
-    if not facts.keep_all:
-        steps, unread = _without_spare(steps, roots)
+    if not keep_all:
+        steps, unread = _drop_spare(steps, roots)
         left_out |= unread
-    return Plan(steps, roots, left_out, _lifetimes(steps, roots))
+    running = _gather_facts({step.name: step.work for step in steps}, facts, faults)
+    return Plan(steps, roots, left_out, _lifetimes(steps, roots), running, graph.origin)
 
 
 Edges = dict[str, dict[str, tuple[str, str] | None]]
@@ -49,7 +56,7 @@ Roots = dict[str, tuple[str, str]]
 
 
 def _resolve(graph: Graph, outputs: Sequence[str], faults: list[str]) -> tuple[Roots, Edges]:
-    """Names to (pass, port) pairs. Whether a source has that port is known once it is described."""
+    """Resolve names to (pass, port) pairs. Whether a source has that port is known once it is described."""
 
     def source(text: str, where: str) -> tuple[str, str] | None:
         name, dot, port = text.partition(".")
@@ -81,9 +88,30 @@ def _resolve(graph: Graph, outputs: Sequence[str], faults: list[str]) -> tuple[R
     return roots, edges
 
 
-def _leave_out(graph: Graph, edges: Edges, facts: Facts) -> dict[str, str]:
-    """Passes that this scene does not need or others replace, and those that cannot run without them."""
-    unneeded = {node.name: why for node in graph.nodes.values() if (why := node.work.unneeded(facts))}
+def _gather_facts(passes: Mapping[str, Pass], facts: Facts, faults: list[str]) -> Facts:
+    """Add what the passes state to `facts`; a fact about which they contradict each other becomes unknown."""
+    stated: dict[Fact[Any], Any] = {}
+    for name, work in passes.items():
+        for fact, value in work.state_facts(facts).items():
+            if isinstance(fact, Fact):
+                stated[fact] = value if stated.get(fact, value) == value else fact.unknown
+            else:
+                faults.append(f"{name}: state_facts(): {fact!r} is no Fact; give the constant that declares it")
+    return facts.add(stated)
+
+
+def _leave_out(graph: Graph, edges: Edges, facts: Facts, faults: list[str]) -> dict[str, str]:
+    """Find the passes that are not needed where `facts` hold, that others replace, and that cannot run without these.
+
+    Returns the reason for each.
+    """
+    unneeded: dict[str, str] = {}
+    for node in graph.nodes.values():
+        try:
+            if why := node.work.unneeded(facts):
+                unneeded[node.name] = why
+        except GraphError as error:
+            faults.append(f"{node.name}: {error}")
     wires = [(name, port, source) for name, ports in edges.items() for port, source in ports.items() if source]
 
     def spread() -> None:
@@ -97,7 +125,7 @@ def _leave_out(graph: Graph, edges: Edges, facts: Facts) -> dict[str, str]:
     spread()
     for name, port, (source, _) in wires:
         if source not in unneeded and graph.nodes[name].work.inputs[port].replaces:
-            unneeded.setdefault(name, f"{source} makes it needless")
+            unneeded.setdefault(name, f"not needed: {source} replaces it")
     spread()
     for name, port, (source, _) in wires:
         if source in unneeded:
@@ -106,7 +134,7 @@ def _leave_out(graph: Graph, edges: Edges, facts: Facts) -> dict[str, str]:
 
 
 def _reach(roots: Roots, edges: Edges, unneeded: Mapping[str, str]) -> set[str]:
-    """The backward walk: every pass that a requested output needs."""
+    """Walk back from the requested outputs. Returns every pass that one of them needs."""
     reached: set[str] = set()
     stack = [name for name, _ in roots.values()]
     while stack:
@@ -118,7 +146,7 @@ def _reach(roots: Roots, edges: Edges, unneeded: Mapping[str, str]) -> set[str]:
 
 
 def _order(edges: Edges, reached: set[str], faults: list[str]) -> list[str]:
-    """Writers before readers; the same file always gives the same order."""
+    """Sort writers before readers; the same file always gives the same order."""
     ahead = {name: [source[0] for source in edges[name].values() if source] for name in edges if name in reached}
     while True:
         try:
@@ -129,8 +157,10 @@ def _order(edges: Edges, reached: set[str], faults: list[str]) -> list[str]:
             ahead = {name: sources for name, sources in ahead.items() if name not in cycle}
 
 
-def _describe(graph: Graph, edges: Edges, order: list[str], faults: list[str]) -> tuple[Step, ...]:
-    """Ask each pass what it writes, given what it reads, and hold both ends of each wire together."""
+def _describe(
+    graph: Graph, edges: Edges, order: list[str], parts: Collection[str] | None, faults: list[str]
+) -> tuple[Step, ...]:
+    """Ask each pass what it writes, given what it reads, and check that both ends of each wire agree."""
     steps: dict[str, Step] = {}
     for name in order:
         work, descriptions = graph.nodes[name].work, dict[str, Description | None]()
@@ -156,10 +186,12 @@ def _describe(graph: Graph, edges: Edges, order: list[str], faults: list[str]) -
                 faults.append(f"{name}: {error}")
                 continue
             steps[name] = step
-            unknown = sorted(work.depends() - FRAME_PARTS)
-            faults.extend(
-                f"{name}: depends(): no part of a frame is '{x}'{did_you_mean(x, FRAME_PARTS)}" for x in unknown
-            )
+            named = work.depends()
+            if parts is not None and named is not None:
+                unknown = sorted(named - set(parts))
+                faults.extend(
+                    f"{name}: depends(): no part of a frame is '{x}'{did_you_mean(x, parts)}" for x in unknown
+                )
             both = sorted(step.outputs.keys() & work.inputs.keys())
             faults.extend(f"{name}.{port}: is an input and an output; rename one of them" for port in both)
     for name, text in graph.outputs.items():
@@ -170,8 +202,8 @@ def _describe(graph: Graph, edges: Edges, order: list[str], faults: list[str]) -
     return tuple(steps.values())
 
 
-def _without_spare(steps: tuple[Step, ...], roots: Roots) -> tuple[tuple[Step, ...], dict[str, str]]:
-    """The steps without the outputs that nobody reads and their passes can do without, and which these were."""
+def _drop_spare(steps: tuple[Step, ...], roots: Roots) -> tuple[tuple[Step, ...], dict[str, str]]:
+    """Drop the outputs that nobody reads and their passes can do without. Returns the steps, and each reason."""
     read = {source for step in steps for source in step.sources.values() if source} | set(roots.values())
     spare = {(s.name, port) for s in steps for port, output in s.outputs.items() if output.spare} - read
     slim = tuple(
@@ -182,7 +214,7 @@ def _without_spare(steps: tuple[Step, ...], roots: Roots) -> tuple[tuple[Step, .
 
 
 def _lifetimes(steps: tuple[Step, ...], roots: Roots) -> dict[tuple[str, str], tuple[int, int]]:
-    """First writer and last reader of each resource, as indices of steps; requested outputs live to the end."""
+    """Find first writer and last reader of each resource, as indices of steps; requested outputs live to the end."""
     spans = {(step.name, port): (i, i) for i, step in enumerate(steps) for port in step.outputs}
     for i, step in enumerate(steps):
         for source in step.sources.values():

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from deferred_ir.graph.facts import NOTHING_KNOWN, Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Output
 
@@ -44,14 +45,20 @@ class Step:
 
 @dataclass(frozen=True)
 class Plan:
-    """What runs, in order; why the rest does not; and when each resource is first written and last read."""
+    """What runs, in order; why the rest does not; and when each resource is first written and last read.
+
+    facts: what is known of its frames: the facts that it was compiled for, and what the passes that run state.
+    origin: the graph's file.
+    """
 
     steps: tuple[Step, ...]
     outputs: Mapping[str, tuple[str, str]]
     left_out: Mapping[str, str]
     lifetimes: Mapping[tuple[str, str], tuple[int, int]]
+    facts: Facts = NOTHING_KNOWN
+    origin: str = "graph"
 
     @property
     def frames_to_fill(self) -> int:
-        """Frames of a still scene until the picture is what it is to be; 1 where nothing is kept between frames."""
+        """Frames of a still scene until the image is complete; 1 where no pass keeps anything between frames."""
         return max((step.work.frames_to_fill() for step in self.steps), default=1)

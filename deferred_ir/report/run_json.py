@@ -39,7 +39,7 @@ def run_record(
             entry["subpasses"] = [dict(subpass) for subpass in subpasses]
     memory = renderer.memory()
     left_out = [*savings.of_scene(scene), *savings.of_frames(renderer, plan, record)]
-    lost = _bias(renderer, scene, graph, plan)
+    lost = lost_light.estimate_for(plan, renderer.tracer)
     # Last, for it draws over what the frames have left.
     time = (len(record.frame_ms) - 1) / FRAMES_PER_SECOND if scene.moves else 0.0
     left_out += savings.of_passes(renderer, scene.at(time), plan, seed=seed)
@@ -71,14 +71,3 @@ def _stand_in(counters: Mapping[str, int]) -> dict[str, int] | None:
     """Triangles and bytes of the mesh that maps of VPLs drew, None where it was the scene's own."""
     names = ("triangles", "bytes")
     return {name: counters[f"stand_in_{name}"] for name in names} if "stand_in_bytes" in counters else None
-
-
-def _bias(renderer: Renderer, scene: Scene, graph: Graph, plan: Plan) -> dict[str, float] | None:
-    """Indirect light lost by design, None where no VPLs were asked for or the camera sees no indirect light."""
-    casting = graph.nodes.get("vpl")
-    if casting is None or casting.work.params.count == 0 or not scene.facts.emits:
-        return None
-    p = casting.work.params
-    given_back = any(step.work.gives_back for step in plan.steps)
-    tracer = renderer.tracer()  # its scene is that of the last frame
-    return lost_light.estimate(tracer.scene, tracer, clamp=p.clamp_fraction, fov=p.fov, given_back=given_back)

@@ -16,7 +16,6 @@ import numpy as np
 
 from deferred_ir.base.arrays import Vec3
 from deferred_ir.base.errors import SceneError, SettingError
-from deferred_ir.graph.pass_base import Facts
 from deferred_ir.scene.camera import Camera, view_fault
 from deferred_ir.scene.geometry import Geometry, Model
 from deferred_ir.scene.lights.spot import Spotlight
@@ -107,9 +106,9 @@ class Scene:
         )
 
     @property
-    def facts(self) -> Facts:
-        """What planning a frame may know of the scene."""
-        return Facts(emits=any(self.spotlight.emission), triangles=len(self.geometry.faces))
+    def emits(self) -> bool:
+        """Whether a light shines."""
+        return any(self.spotlight.emission)
 
     @property
     def moves(self) -> bool:

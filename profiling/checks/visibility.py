@@ -16,6 +16,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.progress import Progress
 from deferred_ir.engine.renderer import Renderer
+from deferred_ir.frame.facts import collect_facts
 from deferred_ir.frame.frame import NEAR
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import graph_hash, load_graph
@@ -117,14 +118,14 @@ def rows(scene: Scene, options: Options, progress: Progress | None = None) -> It
 def _planned(scene: Scene, options: Options) -> list[tuple[dict[str, Any], list[_Maps]]]:
     """Settings, and which maps to measure with them: each kind once, however many settings make it."""
     planned, known = list[tuple[dict[str, Any], list[_Maps]]](), set[_Maps]()
-    if not scene.facts.emits:
+    if not scene.emits:
         return planned
     wide = scene.spotlight.fov > WIDEST_PLANAR
     for choice in _projections(options.settings):
         for vpl_size in options.vpl_sizes:
             settings = {**options.settings, **choice, VPL_SIZE: vpl_size}
             graph = load_graph(GRAPH, settings, PASSES)
-            steps = compile(graph, list(graph.outputs), scene.facts).steps
+            steps = compile(graph, list(graph.outputs), collect_facts(scene)).steps
             step = next(step for step in steps if step.name == MAPS)
             parts = step.work.subpasses(step.descriptions)  # the spotlight's, then those of VPLs
             found = [

@@ -12,10 +12,9 @@ import pytest
 from small_scenes import build, plane, room
 
 from deferred_ir.cli import main
-from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.frame import PARTS, Frame
 from deferred_ir.gl.buffers import GpuBuffer
 from deferred_ir.gl.textures import GpuTexture
-from deferred_ir.graph.pass_base import FRAME_PARTS
 
 SIZE = (32, 24)
 ROOM = room()
@@ -296,7 +295,7 @@ def test_passes_name_all_that_they_read(renderer, graph):
         def watch(frame, io, step=step, execute=execute):
             watched = Watched(frame)
             execute(watched, io)
-            assert watched.read <= step.work.depends() <= FRAME_PARTS, step.name
+            assert watched.read <= step.work.depends() <= PARTS.keys(), step.name
 
         step.work.execute = watch
     one.draw(ROOM, plan)

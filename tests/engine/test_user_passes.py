@@ -14,8 +14,9 @@ from small_scenes import room
 from deferred_ir.base.errors import GraphError, ShaderError
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.frame.fullscreen import FullscreenPass
+from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
-from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Input, Output, Texture
 
 SIZE = (24, 16)

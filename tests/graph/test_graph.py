@@ -9,13 +9,14 @@ import sys
 from collections.abc import Mapping
 from pathlib import Path
 
-from fake_passes import Fake, diamond, graph, names, reads, source
+from fake_passes import SHINES, Fake, diamond, graph, names, reads, source
 from hypothesis import given
 from hypothesis import strategies as st
 
 from deferred_ir.graph.compile import compile
+from deferred_ir.graph.facts import Fact, Facts
 from deferred_ir.graph.graph import Graph
-from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Input, Output, Texture
 
 
@@ -38,15 +39,63 @@ def test_an_optional_input_becomes_none_when_its_source_is_not_needed():
         maps=(Fake(unneeded_because="the light is off"), {}),
         light=(Fake(reads("shadows", optional=True)), {"shadows": "maps.out"}),
     )
-    plan = compile(chain, ["image"], Facts(emits=False))
+    plan = compile(chain, ["image"], Facts({SHINES: False}))
     assert names(plan) == ["light"]
     assert plan.steps[0].sources == {"shadows": None}
     assert plan.steps[0].descriptions == {"shadows": None}
     assert plan.left_out == {"maps": "the light is off"}
-    on = compile(chain, ["image"], Facts(emits=True))
+    on = compile(chain, ["image"], Facts({SHINES: True}))
     assert names(on) == ["maps", "light"]
     assert on.steps[1].sources == {"shadows": ("maps", "out")}
     assert on.left_out == {}
+
+
+COUNT = Fact("count", unknown=1, doc="How many lights a pixel sees.")
+
+
+class Stating(Fake):
+    """States how many lights a pixel sees."""
+
+    def __init__(self, count: int):
+        super().__init__()
+        self.count = count
+
+    def state_facts(self, facts):
+        return {COUNT: self.count} if facts[SHINES] else {}
+
+
+class Asking(Fake):
+    """Not needed where pixels see several lights."""
+
+    def unneeded(self, facts):
+        return f"{facts[COUNT]} lights" if facts[COUNT] > 1 else None
+
+
+def asked(*counts: int, **options):
+    """Why a pass is left out where others state `counts`."""
+    stating = {f"s{i}": (Stating(count), {}) for i, count in enumerate(counts)}
+    light = (Fake(reads("x", optional=True)), {"x": "asking.out"})
+    return compile(graph(asking=(Asking(), {}), **stating, light=light), ["image"], **options).left_out.get("asking")
+
+
+def test_what_one_pass_states_counts_for_the_others():
+    assert asked() is None
+    assert asked(4) == asked(4, 4) == "4 lights"
+    assert asked(4, facts=Facts({SHINES: False})) is None
+    assert asked(1, facts=Facts({COUNT: 9})) is None
+
+
+def test_where_passes_contradict_each_other_nothing_is_known():
+    assert asked(4, 9) is asked(9, 4, 9) is None
+
+
+def test_with_keep_all_only_the_needs_of_a_scene_count_as_unknown():
+    assert asked(4, keep_all=True) == "4 lights"
+    chain = graph(
+        maps=(Fake(unneeded_because="the light is off"), {}),
+        light=(Fake(reads("shadows", optional=True)), {"shadows": "maps.out"}),
+    )
+    assert compile(chain, ["image"], Facts({SHINES: False}), keep_all=True).left_out == {}
 
 
 def test_an_optional_input_may_stay_unconnected():
@@ -62,7 +111,7 @@ def test_what_is_left_out_takes_its_readers_along_up_to_an_optional_input():
         maps=(Fake(unneeded_because="the light is off"), {}),
         end=(Fake(reads("image")), {"image": "light.out"}),
     )
-    plan = compile(chain, ["image"], Facts(emits=False))
+    plan = compile(chain, ["image"], Facts({SHINES: False}))
     assert names(plan) == ["light", "end"]
     assert plan.left_out == {
         "maps": "the light is off",
@@ -89,11 +138,11 @@ def test_a_pass_is_left_out_where_another_replaces_it():
     plan = compile(replaced(), ["image"])
     assert names(plan) == ["pixels", "rays", "light"]
     assert plan.steps[-1].sources == {"shadows": None, "rays": ("rays", "out")}
-    assert plan.left_out == {"vertices": "no requested output needs it", "maps": "rays makes it needless"}
+    assert plan.left_out == {"vertices": "no requested output needs it", "maps": "not needed: rays replaces it"}
 
 
 def test_what_is_left_out_replaces_nothing():
-    plan = compile(replaced("the light is off"), ["image"], Facts(emits=False))
+    plan = compile(replaced("the light is off"), ["image"], Facts({SHINES: False}))
     assert names(plan) == ["vertices", "maps", "light"]
     assert plan.steps[-1].sources == {"shadows": ("maps", "out"), "rays": None}
 
@@ -104,7 +153,7 @@ def test_what_only_left_out_passes_read_is_left_out_too():
         maps=(Fake(reads("x"), unneeded_because="the light is off"), {"x": "vertices.out"}),
         light=(Fake(reads("shadows", optional=True)), {"shadows": "maps.out"}),
     )
-    plan = compile(chain, ["image"], Facts(emits=False))
+    plan = compile(chain, ["image"], Facts({SHINES: False}))
     assert plan.left_out == {"vertices": "no requested output needs it", "maps": "the light is off"}
 
 
@@ -200,7 +249,7 @@ def test_any_graph_without_a_cycle_runs_what_is_needed_in_order(count: int, rng:
     rng.shuffle(nodes)
     nodes.append(("end", (Fake(reads("x", optional=True)), {"x": f"p{count - 1}.out"} if count else {})))
     whole = graph(**dict(nodes))
-    plan = compile(whole, ["image"], Facts(emits=not off))
+    plan = compile(whole, ["image"], Facts({SHINES: not off}))
 
     place = {name: i for i, name in enumerate(names(plan))}
     assert set(place) | set(plan.left_out) == set(whole.nodes)

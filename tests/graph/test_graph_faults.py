@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import pytest
-from fake_passes import Fake, graph, reads, source
+from fake_passes import SHINES, Fake, graph, reads, source
 
 from deferred_ir.base.errors import GraphError
 from deferred_ir.graph.compile import compile
+from deferred_ir.graph.facts import NOTHING_KNOWN, Facts
 from deferred_ir.graph.graph import Graph
-from deferred_ir.graph.pass_base import Facts
 from deferred_ir.graph.ports import Buffer, Output
 
 
-def faults(broken: Graph, outputs: Sequence[str] = ("image",), facts: Facts | None = None) -> str:
+def faults(broken: Graph, outputs: Sequence[str] = ("image",), facts: Facts = NOTHING_KNOWN, **options: Any) -> str:
     """The message of the one error: one line that begins with the graph's file."""
     with pytest.raises(GraphError) as raised:
-        compile(broken, outputs, facts or Facts())
+        compile(broken, outputs, facts, **options)
     message = str(raised.value)
     assert message.startswith("some.toml: ")
     assert "\n" not in message
@@ -42,7 +43,20 @@ def test_a_port_that_is_input_and_output():
 def test_a_part_of_a_frame_that_does_not_exist():
     work = Fake()
     work.depends = lambda: frozenset({"camera", "lights"})
-    assert faults(graph(light=(work, {}))) == "light: depends(): no part of a frame is 'lights'; did you mean 'light'?"
+    told = faults(graph(light=(work, {})), parts=("camera", "light"))
+    assert told == "light: depends(): no part of a frame is 'lights'; did you mean 'light'?"
+
+
+def test_a_fact_that_no_constant_declares():
+    """By its name it would never be found: a misspelt one would count as unknown for ever."""
+    asks, states = Fake(), Fake()
+    asks.unneeded = lambda facts: facts["shines"] and None
+    states.state_facts = lambda facts: {"shines": False}
+    told = faults(graph({"a": "asks.out", "b": "states.out"}, asks=(asks, {}), states=(states, {})), ("a", "b"))
+    assert told == (
+        "states: state_facts(): 'shines' is no Fact; give the constant that declares it; "
+        "asks: facts['shines']: is no Fact; ask by the constant that declares it, such as EMITS"
+    )
 
 
 def test_a_required_input_that_is_not_connected():
@@ -119,7 +133,7 @@ def test_an_output_that_leads_nowhere(text, message):
 
 def test_an_output_of_a_pass_that_is_left_out():
     broken = graph(a=(Fake(unneeded_because="the light is off"), {}))
-    assert faults(broken, facts=Facts(emits=False)) == (
+    assert faults(broken, facts=Facts({SHINES: False})) == (
         "output 'image' comes from a, which is left out: the light is off"
     )
 

@@ -14,12 +14,14 @@ from hypothesis import strategies as st
 from toml_text import to_toml
 
 from deferred_ir.base.errors import GraphError
+from deferred_ir.frame.facts import EMITS
 from deferred_ir.graph import file, former_names
 from deferred_ir.graph.compile import compile
+from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.file import graph_hash, graph_names, load_graph
 from deferred_ir.graph.graph import Graph
 from deferred_ir.graph.params import param, specs
-from deferred_ir.graph.pass_base import Facts, Pass
+from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Input, Output, Texture
 
 SMALL = """
@@ -95,7 +97,7 @@ def test_the_graphs_of_the_contract_are_there():
 def test_every_built_in_graph_loads_and_compiles(name, emits):
     graph = load_graph(name)
     assert {"radiance", "display"} <= set(graph.outputs)
-    plan = compile(graph, list(graph.outputs), Facts(emits=emits))
+    plan = compile(graph, list(graph.outputs), Facts({EMITS: emits}))
     assert {step.name for step in plan.steps} | set(plan.left_out) == set(graph.nodes)
 
 

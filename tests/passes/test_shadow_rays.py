@@ -9,9 +9,10 @@ import pytest
 from distance import rel_mse, share_off
 from small_scenes import crooked_room, room, smooth_scene
 
+from deferred_ir.frame.facts import EMITS, SOFTWARE, TRIANGLES
 from deferred_ir.graph.compile import compile
+from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.file import load_graph
-from deferred_ir.graph.pass_base import Facts
 from deferred_ir.truth.path_tracer import PathTracer
 from deferred_ir.vpls.cast import Vpls, cast
 from deferred_ir.vpls.interleaving import deal, find_places, find_share_starts, find_sub_buffers
@@ -100,7 +101,7 @@ def test_rays_and_maps_make_the_same_picture(renderer):
 
 def test_with_rays_no_light_has_a_map(renderer):
     one, plan = drawn(renderer, room(), 64)
-    assert plan.left_out["shadow_maps"] == "shadow_rays makes it needless"
+    assert plan.left_out["shadow_maps"] == "not needed: shadow_rays replaces it"
     assert one.executor.counters["maps_drawn"] == 0
     maps = renderer(SIZE, "accurate", set={"shadow_rays.visibility": "maps"}).plan(room(), 64)
     assert "shadow_maps" in {step.name for step in maps.steps}
@@ -127,15 +128,16 @@ def test_few_vpls_are_no_trouble(renderer, vpls):
     assert np.isfinite(one.read(plan).radiance).all()
 
 
-def left_out(visibility="auto", **facts):
-    plan = compile(load_graph("accurate", {"shadow_rays.visibility": visibility}, {}), ["radiance"], Facts(**facts))
+def left_out(visibility, facts):
+    plan = compile(load_graph("accurate", {"shadow_rays.visibility": visibility}, {}), ["radiance"], Facts(facts))
     return plan.left_out.get("shadow_rays")
 
 
 def test_auto_takes_what_should_cost_less_and_says_so():
-    assert left_out(triangles=100_000) is None
-    assert left_out(triangles=10).startswith("maps should take less time: 0.15 ms for each VPL, rays ")
-    assert "less time" in left_out(triangles=100_000, software=False)  # a GPU draws maps in no time
-    assert left_out("rays", triangles=10) is None
-    assert left_out("maps", triangles=100_000) == "visibility is 'maps'"
-    assert left_out("rays", emits=False) == "the spotlight emits nothing"
+    few, many = {TRIANGLES: 10}, {TRIANGLES: 100_000}
+    assert left_out("auto", many) is None
+    assert left_out("auto", few).startswith("maps should take less time: 0.15 ms for each VPL, rays ")
+    assert "less time" in left_out("auto", {**many, SOFTWARE: False})  # a GPU draws maps in no time
+    assert left_out("rays", few) is None
+    assert left_out("maps", many) == "visibility is 'maps'"
+    assert left_out("rays", {EMITS: False}) == "the spotlight emits nothing"

@@ -53,10 +53,10 @@ def test_the_clamp_takes_more_the_larger_it_is():
 def test_what_short_rays_give_back_is_not_lost():
     scene = room()
     limits = {"clamp": 0.1, "fov": 120}
-    plain, mended = (lost_light.estimate(scene, Tracer(scene), given_back=back, **limits) for back in (False, True))
+    plain, mended = (lost_light.estimate(scene, Tracer(scene), returned=back, **limits) for back in (False, True))
     assert mended["clamp"] == 0 > plain["clamp"]
     assert plain["wide_light"] < mended["wide_light"] < 0  # beyond the rays' reach the cone's loss stays
-    assert lost_light.estimate(scene, Tracer(scene), given_back=True, clamp=10, fov=120) == {
+    assert lost_light.estimate(scene, Tracer(scene), returned=True, clamp=10, fov=120) == {
         "clamp": 0,
         "wide_light": 0,
     }

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from deferred_ir.graph.facts import Fact
 from deferred_ir.graph.graph import Graph, Node, Plan
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Input, Output, Texture
+
+SHINES = Fact("shines", unknown=True, doc="The light is on.", needs=True)
 
 
 class Fake(Pass):
@@ -29,7 +32,7 @@ class Fake(Pass):
         return {port: Output("", Texture(format)) for port, format in self.written.items()}
 
     def unneeded(self, facts):
-        return None if facts.emits else self.reason
+        return None if facts[SHINES] else self.reason
 
 
 def graph(outputs: Mapping[str, str] | None = None, /, **nodes: tuple[Pass, Mapping[str, str]]) -> Graph:

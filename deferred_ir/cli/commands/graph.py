@@ -23,17 +23,18 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the plan of all outputs of the graph, for a scene if one is named."""
     from deferred_ir.engine.settings import choose_settings, parse_settings
     from deferred_ir.graph.compile import compile
+    from deferred_ir.graph.facts import NOTHING_KNOWN
     from deferred_ir.graph.file import load_graph
-    from deferred_ir.graph.pass_base import Facts
     from deferred_ir.report import plan_text
     from deferred_ir.scene.scene import RenderDefaults
 
-    defaults, facts, scene = RenderDefaults(), Facts(), None
+    defaults, facts, scene = RenderDefaults(), NOTHING_KNOWN, None
     if arguments.scene is not None:
+        from deferred_ir.frame.facts import collect_facts
         from deferred_ir.loading.load import load
 
         scene = load(arguments.scene)
-        defaults, facts = scene.render, scene.facts
+        defaults, facts = scene.render, collect_facts(scene)
     graph = load_graph(arguments.graph, choose_settings(defaults, parse_settings(arguments.set), arguments.vpls))
     plan = compile(graph, list(graph.outputs), facts)
     print(plan_text.dot(graph, plan) if arguments.dot else plan_text.summary(plan, scene))

@@ -19,7 +19,8 @@ from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
-from deferred_ir.vpls.clamp_residual import residual
+from deferred_ir.rays.pixel_surfaces import PixelJob
+from deferred_ir.vpls.clamp_residual import trace_residual
 from deferred_ir.vpls.interleaving import SharesMeta
 
 
@@ -70,17 +71,11 @@ class NearField(Pass):
         if len(vpl) == 0:
             io.framebuffer.clear_color()
             return
-        image = residual(
-            frame.tracer(),
-            frame.scene.spotlight,
-            frame.surfaces(io["depth"], io["normals"]),
-            frame.size,
-            read_limits(vpl),
-            samples=self.params.samples,
-            block=io.meta("vpls", SharesMeta).n if io["vpls"] else 1,
-            bounces=io.meta("lights", LightsMeta).bounces,
-            seed=frame.seed,
-        )
+        block = io.meta("vpls", SharesMeta).n if io["vpls"] else 1
+        seen = frame.surfaces(io["depth"], io["normals"])
+        job = PixelJob(frame.tracer(), seen, frame.size, block, frame.seed)
+        bounces = io.meta("lights", LightsMeta).bounces
+        image = trace_residual(job, read_limits(vpl), samples=self.params.samples, bounces=bounces)
         io["residual"].upload(image)
 
 

@@ -22,7 +22,8 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
-from deferred_ir.rays.direct import on_pixels
+from deferred_ir.rays.direct import trace_spotlight
+from deferred_ir.rays.pixel_surfaces import PixelJob
 from deferred_ir.vpls.interleaving import find_places, find_share_starts
 from deferred_ir.vpls.ray_masks import BITS, trace_masks
 
@@ -91,8 +92,8 @@ class ShadowRays(Pass):
             words, _ = trace_masks(tracer, seen, read_vpls(vpls), read_limits(vpls), shares)
             image[: len(words), place] = words
         io["masks"].upload(image.reshape(-1, height, width, 1))
-        samples, light = self.params.disc_samples, frame.scene.spotlight
-        direct = on_pixels(tracer, light, seen, frame.size, samples=samples, block=n, seed=frame.seed)
+        job = PixelJob(tracer, seen, frame.size, n, frame.seed)
+        direct = trace_spotlight(job, samples=self.params.disc_samples)
         io["spotlight"].upload(direct[..., None])
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.parallel import in_order
-from deferred_ir.rays.pixel_surfaces import Surfaces
+from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.sampling import pixel_blocks, streams
 from deferred_ir.sampling.warps import build_basis, square_to_disc
@@ -29,23 +29,14 @@ def lit_by(light: Spotlight, tracer: Tracer, at: Hits, rng: np.random.Generator)
     return _arriving(light, tracer, at, points)
 
 
-def on_pixels(
-    tracer: Tracer,
-    light: Spotlight,
-    seen: Surfaces,
-    size: tuple[int, int],
-    *,
-    samples: int,
-    block: int,
-    seed: int = 0,
-    threads: int | None = None,
-) -> Array:
-    """Irradiance by the spotlight over its emission, float32 (H, W), bottom row first; 0 on the background.
+def trace_spotlight(job: PixelJob, *, samples: int) -> Array:
+    """Return the spotlight's irradiance over its emission, float32 (H, W), bottom row first as in OpenGL.
 
-    Exact for a point light. Of a disc each pixel asks `samples` points, and those of block x block pixels (1, 2, 4 or
-    8 a side) are spread over it together; the mean over seeds is exact. The same for any number of threads.
+    It is 0 on the background, and exact for a point light. A disc is sampled at `samples` points a pixel, spread over
+    it together by the pixels of a block; the mean over seeds is exact.
     """
-    width, height = size
+    tracer, seen, seed, block = job.tracer, job.seen, job.seed, job.block
+    light, (width, height) = tracer.scene.spotlight, job.size
     image = np.zeros(height * width, np.float32)
     tasks = [(i, slice(start, start + PIXELS)) for i, start in enumerate(range(0, len(seen.pixel), PIXELS))]
     dealing = streams.shadow_blocks(seed)
@@ -63,7 +54,7 @@ def on_pixels(
             total += _arriving(light, tracer, at, _spiral(places % 1, i, samples))
         return total / samples
 
-    with closing(in_order(work, tasks, threads)) as results:
+    with closing(in_order(work, tasks, job.threads)) as results:
         for (_, rows), part in zip(tasks, results, strict=True):
             image[seen.pixel[rows]] = part
     return image.reshape(height, width)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 
 
@@ -28,6 +29,23 @@ class Surfaces:
         normal = self.normal[chosen]
         smooth = normal if self.shading_normal is self.normal else self.shading_normal[chosen]
         return Surfaces(self.pixel[chosen], self.position[chosen], normal, smooth)
+
+
+@dataclass(frozen=True, eq=False)
+class PixelJob:
+    """Work for rays from the surfaces behind an image's pixels, whose result is an image that is made to be filtered.
+
+    size: (width, height) of the image. block: pixels along the edge of a block, 1, 2, 4 or 8; samples are spread over
+    each window of block x block pixels together. Results depend on the seed, not on the number of threads; None is as
+    many as the machine has.
+    """
+
+    tracer: Tracer
+    seen: Surfaces
+    size: tuple[int, int]
+    block: int = 1
+    seed: int = 0
+    threads: int | None = None
 
 
 def from_gbuffer(camera: Camera, near: float, depth: Array, normals: Array, *, smooth: bool = True) -> Surfaces:

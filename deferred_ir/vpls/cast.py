@@ -1,14 +1,15 @@
-"""Casting virtual point lights: rays from the spotlight, a diffuse light where each lands (Keller 1997).
+"""Cast virtual point lights (VPLs): rays from the spotlight, each of which makes a diffuse light where it lands (Keller
+1997).
 
 Rays are uniform on the disc of radius r = sin(fov/2), lifted to the sphere (Nusselt's analogue), so each of N carries
 E r^2/N cone(theta), and the VPL it makes has E_i = E r^2/N cone(theta) rho. As N grows, their sum is exactly one
-diffuse bounce. With a disc light, each ray starts at a point of the disc of its own.
+diffuse bounce. With a disc light, each ray starts at a random point of the disc.
 
-Further bounces continue the paths. Of the lights of one bounce, M are drawn by systematic resampling with probability
+Further bounces continue the paths. From the VPLs of one bounce, M are drawn by systematic resampling with probability
 proportional to their luminous power, and a ray leaves each about its normal, cosine-distributed. M falls from bounce to
-bounce as the power does, so that all VPLs carry about the same, as in Keller's fixed fractions; but where those go by
-the scene's mean reflectance, drawing by power is unbiased in any scene, and unlike with Russian roulette the luminous
-power of a bounce does not fluctuate: what M rays carry on is exactly what arrived.
+bounce as the power does, so that all VPLs carry about the same power, as in Keller's fixed fractions. Those go by the
+scene's mean reflectance; drawing by power is unbiased in any scene, and unlike with Russian roulette the luminous power
+of a bounce does not fluctuate: the M rays together carry on exactly the power that arrived.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ from deferred_ir.vpls.kernel import cosine_ratio
 
 @dataclass(frozen=True, eq=False)
 class Vpls:
-    """n living VPLs; float64 (n, 3) each. They shine as I(w) = emission cos(theta) about their normal.
+    """n VPLs, arrays (n, 3), which shine as I(w) = emission cos(theta) about their normal.
 
-    ray: int (n,), which of its bounce's rays made it.
+    ray: int (n,), the number of the ray that made the VPL, among the rays of its bounce.
     """
 
     position: Array
@@ -49,39 +50,39 @@ NONE = Vpls(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, in
 def cast(
     light: Spotlight, tracer: Tracer, count: int, pattern: Pattern = "random", seed: int = 0, *, bounces: int = 1
 ) -> Vpls:
-    """The VPLs of `count` rays and `bounces` bounces, the first bounce's first.
+    """Cast `count` rays and follow them for `bounces` bounces. Returns the VPLs, those of the first bounce first.
 
-    Rays that miss or have no power make none and are not replaced.
+    Rays that miss or carry no power make no VPL and are not replaced.
     """
     if count == 0:
         return NONE
-    origins, directions = _leave(light, count, pattern, seed)
+    origins, directions = _start_rays(light, count, pattern, seed)
     radius = np.sin(np.radians(light.fov) / 2)
     carried = np.multiply.outer(light.cone(directions) * radius**2 / count, np.asarray(light.emission, float))
     left = (carried @ LUMINANCE).sum()
-    made = [_land(tracer, origins, directions, carried)]
+    by_bounce = [_make_vpls(tracer, origins, directions, carried)]
     for bounce in range(1, bounces):
-        last = made[-1]
+        last = by_bounce[-1]
         power = last.emission @ LUMINANCE
-        # Smooth normals can bend the light up; buffers have room for `count` a bounce.
+        # Smooth normals can raise the power, but buffers have room for `count` VPLs a bounce.
         rays = min(count, round(count * power.sum() / left)) if left > 0 else 0
         if rays == 0:
             break
         rng = streams.bounce(seed, bounce)
         drawn = systematic(power, rays, rng.random())
-        # Each bounce has a pattern of its own, shuffled: in its own order it would go with that of the bounce before.
+        # Each bounce has its own pattern, shuffled: in order it would correlate with that of the bounce before.
         square = rng.permutation(unit_square(pattern, rays, streams.bounce_pattern(seed, bounce)))
         normal = last.normal[drawn]
         carried = last.emission[drawn] * (power.sum() / (rays * power[drawn]))[:, None]
         directions = lift_to_hemisphere(square_to_disc(square), normal)
-        made.append(_land(tracer, tracer.lift(last.position[drawn], normal), directions, carried))
-    if len(made) == 1:
-        return made[0]
-    return Vpls(*(np.concatenate([getattr(part, f.name) for part in made]) for f in fields(Vpls)))
+        by_bounce.append(_make_vpls(tracer, tracer.lift(last.position[drawn], normal), directions, carried))
+    if len(by_bounce) == 1:
+        return by_bounce[0]
+    return Vpls(*(np.concatenate([getattr(part, f.name) for part in by_bounce]) for f in fields(Vpls)))
 
 
-def _leave(light: Spotlight, count: int, pattern: Pattern, seed: int) -> tuple[Array, Array]:
-    """Where the rays of the first bounce start, and their unit directions."""
+def _start_rays(light: Spotlight, count: int, pattern: Pattern, seed: int) -> tuple[Array, Array]:
+    """Return origins and unit directions of the rays of the first bounce, (n, 3) each."""
     points = unit_disc(pattern, count, seed) * np.sin(np.radians(light.fov) / 2)
     origins = np.broadcast_to(np.asarray(light.position, float), (count, 3))
     if light.radius > 0:
@@ -92,8 +93,8 @@ def _leave(light: Spotlight, count: int, pattern: Pattern, seed: int) -> tuple[A
     return origins, lift_to_hemisphere(points, light.axis[None])
 
 
-def _land(tracer: Tracer, origins: Array, directions: Array, carried: Array) -> Vpls:
-    """VPLs where rays land that carry `carried` (n, 3)."""
+def _make_vpls(tracer: Tracer, origins: Array, directions: Array, carried: Array) -> Vpls:
+    """Trace rays with powers `carried` (n, 3). Returns the VPLs that they make."""
     hits = tracer.closest(origins, directions)
     emission = carried * hits.albedo * cosine_ratio(hits.normal, hits.shading_normal, directions)[:, None]
     alive = np.flatnonzero(hits.hit & (emission > 0).any(axis=1))

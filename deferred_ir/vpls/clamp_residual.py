@@ -1,13 +1,13 @@
-"""What the clamp on 1/d^2 takes, given back by short rays (Kollig and Keller 2004, Illumination in the Presence of Weak
-Singularities).
+"""Restore by short rays the light that the clamp on 1/d^2 takes (Kollig and Keller 2004, "Illumination in the Presence
+of Weak Singularities").
 
-VPLs light a point x with 1/d^2 * min(1, d^2/c^2). What is missing is an integral over the directions whose first hit y
-lies nearer than c, of L(y) cos (1 - d^2/c^2), and cosine-distributed rays of length c estimate it without any
-singularity. Together the two are exact. Rays carry on from y where VPLs have more than one bounce.
+VPLs light a point x with 1/d^2 * min(1, d^2/c^2). What is missing is the integral of L(y) cos (1 - d^2/c^2) over the
+directions whose first hit y lies nearer than c. Cosine-distributed rays of length c estimate it without any
+singularity, and together the two are exact. Where VPLs have more than one bounce, rays carry on from y.
 
-Each pixel of a block takes other cells of one stratification, so that the mean over any window of a block's size is
-that of a well spread set: the image is made to be filtered. Each seed deals the cells anew, so that the mean over seeds
-is right at every pixel.
+The pixels of a block take different cells of one stratification, so that the samples in any window of a block's size
+are well spread: the image is made to be filtered. Each seed deals the cells anew, so that the mean over seeds is right
+at every pixel.
 """
 
 from __future__ import annotations
@@ -20,36 +20,23 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.base.parallel import in_order
 from deferred_ir.rays.direct import lit_by
-from deferred_ir.rays.pixel_surfaces import Surfaces
+from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.sampling import pixel_blocks, streams
-from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.vpls.kernel import VplLimits
 
 RAYS = 1 << 14
 """Rays of a task: few enough for their arrays to stay in a core's cache."""
 
 
-def residual(
-    tracer: Tracer,
-    light: Spotlight,
-    seen: Surfaces,
-    size: tuple[int, int],
-    limits: VplLimits,
-    *,
-    samples: float,
-    block: int,
-    bounces: int = 1,
-    seed: int = 0,
-    threads: int | None = None,
-) -> Array:
-    """Irradiance that VPLs of `bounces` bounces miss, float32 (H, W, 4), bottom row first, unfiltered.
+def trace_residual(job: PixelJob, limits: VplLimits, *, samples: float, bounces: int = 1) -> Array:
+    """Return the irradiance that VPLs of `bounces` bounces miss, float32 (H, W, 4), bottom row first as in OpenGL.
 
-    size: (width, height). samples: rays a pixel, below 1 the share of pixels that trace one, above 1 a whole number.
-    block: 1, 2, 4 or 8; the mean over any window of block x block pixels is right. alpha: weight of the pixel in that
-    mean, 0 where no ray was traced or nothing was seen. The same for any number of threads.
+    The image is not filtered yet: the mean over any window of block x block pixels is right. alpha is a pixel's weight
+    in it, 0 where no ray was traced or nothing was seen. samples: rays a pixel; below 1 the fraction of pixels that
+    trace one, above 1 a whole number.
     """
-    width, height = size
+    seen, seed, block, (width, height) = job.seen, job.seed, job.block, job.size
     image = np.zeros((height * width, 4), np.float32)
     if limits.clamp <= 0:
         return image.reshape(height, width, 4)
@@ -61,17 +48,17 @@ def residual(
     per_task = max(1, RAYS // each)
     tasks = [(i, slice(start, start + per_task)) for i, start in enumerate(range(0, len(traced), per_task))]
     lattice = pixel_blocks.lattice(total)
-    rays, emission = _Rays(tracer, light, seen, limits, bounces), np.asarray(light.emission, float)
+    rays, emission = _Rays(job.tracer, seen, limits, bounces), np.asarray(job.tracer.scene.spotlight.emission, float)
 
     def work(task: tuple[int, slice]) -> Array:
         number, chosen = task
         rng = streams.residual_rays(seed, number)
         rows = np.repeat(traced[chosen], each)
         points = (pixel_blocks.jittered(index[chosen].reshape(-1), lattice, rng) + shift) % 1
-        brought: Array = rays.bring(rows, points, rng).reshape(-1, each, 3).mean(axis=1) * emission
-        return brought
+        irradiance: Array = rays.trace(rows, points, rng).reshape(-1, each, 3).mean(axis=1) * emission
+        return irradiance
 
-    with closing(in_order(work, tasks, threads)) as results:
+    with closing(in_order(work, tasks, job.threads)) as results:
         for (_, chosen), part in zip(tasks, results, strict=True):
             pixels = seen.pixel[traced[chosen]]
             image[pixels, :3] = part * weight
@@ -81,18 +68,17 @@ def residual(
 
 @dataclass(frozen=True, eq=False)
 class _Rays:
-    """Short rays from what is seen, and how they carry on."""
+    """Short rays from the surfaces `seen`, and the bounces that follow."""
 
     tracer: Tracer
-    light: Spotlight
     seen: Surfaces
     limits: VplLimits
     bounces: int
 
-    def bring(self, rows: Ints, points: Array, rng: np.random.Generator) -> Array:
-        """Irradiance over emission that one ray from each of the surfaces `rows` brings, float64 (n, 3)."""
+    def trace(self, rows: Ints, points: Array, rng: np.random.Generator) -> Array:
+        """Return the irradiance over emission that one ray from each of the surfaces `rows` brings, float64 (n, 3)."""
         tracer, position, normal = self.tracer, self.seen.position[rows], self.seen.normal[rows]
-        directions, above = _about(self.seen.shading_normal[rows], normal, points)
+        directions, above = _sample_directions(self.seen.shading_normal[rows], normal, points)
         start = tracer.lift(position[above], normal[above])
         found, at = tracer.within(start, directions[above], self.limits.clamp + tracer.offset)
         rays = above[found]
@@ -104,22 +90,22 @@ class _Rays:
         for bounce in range(self.bounces):
             if bounce:
                 rays, throughput, at = self._carry_on(rays, throughput, at, rng)
-            carried[rays] += throughput * lit_by(self.light, tracer, at, rng)[:, None]
+            carried[rays] += throughput * lit_by(tracer.scene.spotlight, tracer, at, rng)[:, None]
         return carried
 
     def _carry_on(self, rays: Ints, throughput: Array, at: Hits, rng: np.random.Generator) -> tuple[Ints, Array, Hits]:
-        """One bounce more: what is left of the rays, and where they land."""
-        directions, above = _about(at.shading_normal, at.normal, rng.random((len(rays), 2)))
+        """Follow rays for another bounce. Returns those that hit something, their throughputs and their hits."""
+        directions, above = _sample_directions(at.shading_normal, at.normal, rng.random((len(rays), 2)))
         start = self.tracer.lift(at.position[above], at.normal[above])
         found, landed = self.tracer.within(start, directions[above], np.inf)
-        kept = above[found]
-        return rays[kept], throughput[kept] * landed.albedo, landed
+        hit = above[found]
+        return rays[hit], throughput[hit] * landed.albedo, landed
 
 
-def _about(shading_normals: Array, normals: Array, points: Array) -> tuple[Array, Ints]:
-    """Unit directions, cosine-distributed about shading normals (n, 3), and the rows of those above their face.
+def _sample_directions(shading_normals: Array, normals: Array, points: Array) -> tuple[Array, Ints]:
+    """Return unit directions, cosine-distributed about shading normals (n, 3), and the rows of those above their face.
 
-    A unit normal plus a point of the unit sphere (Archimedes' map of `points`, (n, 2)), which needs no frame.
+    Each is a unit normal plus a point of the unit sphere (Archimedes' map of `points`, (n, 2)), which needs no basis.
     """
     height, angle = 1 - 2 * points[:, 0], 2 * np.pi * points[:, 1]
     radius = np.sqrt(np.maximum(1 - height * height, 0))

@@ -76,7 +76,7 @@ class IncrementalVpls:
         self._give_up(light, tracer, disc)
         whole, most = most, most - min(most // RESERVED, int(self._maps.stale.sum()))
         slots = np.flatnonzero(self.used)
-        cells = Cells(disc.points(self.direction[slots]))
+        cells = Cells(disc.project(self.direction[slots]))
         free = np.flatnonzero(~self.used)[:most]
         for _ in free:
             cells.add(self._hole(cells)[0])
@@ -88,7 +88,7 @@ class IncrementalVpls:
         self.weights[slots] = cells.shares()
         place = np.zeros((len(self.used), 2))
         place[slots] = cells.sites
-        self._shoot(light, tracer, fresh, disc.directions(place[fresh]))
+        self._shoot(light, tracer, fresh, disc.unproject(place[fresh]))
         again = self._maps.worst(self.weights * self.albedo.sum(axis=1), whole - len(fresh))
         self.version[again] = new_versions(len(again))
         drawn = np.union1d(fresh, again)

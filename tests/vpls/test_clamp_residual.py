@@ -9,13 +9,13 @@ import pytest
 from small_scenes import build, plane, quad, room, scaled, sphere, textured
 
 from deferred_ir.frame.frame import NEAR
-from deferred_ir.rays.pixel_surfaces import Surfaces, from_gbuffer
+from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces, from_gbuffer
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.truth.path_tracer import PathTracer
 from deferred_ir.vpls.cast import cast
-from deferred_ir.vpls.clamp_residual import residual
+from deferred_ir.vpls.clamp_residual import trace_residual
 from deferred_ir.vpls.kernel import VplLimits
 from deferred_ir.vpls.ray_sum import sum_radiance
 
@@ -32,13 +32,13 @@ def seen_by(scene, tracer, size=SIZE):
     return Surfaces(rows, position, normal, smooth), hits
 
 
-def given_back(scene, *, clamp, fov=180.0, seed=0, size=SIZE, samples=16.0, block=4, **options):
+def given_back(scene, *, clamp, fov=180.0, seed=0, size=SIZE, samples=16.0, block=4, threads=None, **options):
     """Radiance that the near field brings, (H, W, 3), top row first."""
     tracer = Tracer(scene)
     seen, hits = seen_by(scene, tracer, size)
     limits = VplLimits.from_angle(fov, clamp * scene.geometry.diagonal)
-    options = {"samples": samples, "block": block, "seed": seed, **options}
-    image = residual(tracer, scene.spotlight, seen, size, limits, **options)
+    job = PixelJob(tracer, seen, size, block, seed, threads)
+    image = trace_residual(job, limits, samples=samples, **options)
     return image[..., :3] * hits.albedo.reshape(*image.shape[:2], 3) / np.pi
 
 
@@ -154,7 +154,7 @@ def test_beside_a_wall_it_is_the_integral_over_the_wall():
             np.tile(np.array([x, 0, 0], np.float32), (count, 1)),
             *[np.tile(np.array([0, 1, 0], np.float32), (count, 1))] * 2,
         )
-        image = residual(Tracer(scene), light, seen, (64, 64), VplLimits(c), samples=16, block=4)
+        image = trace_residual(PixelJob(Tracer(scene), seen, (64, 64), 4), VplLimits(c), samples=16)
         np.testing.assert_allclose(image[..., :3].mean(axis=(0, 1)), expected, rtol=0.01)
 
 
@@ -203,7 +203,7 @@ def test_weights_of_a_window_add_up_to_its_pixels(samples):
     scene = room()
     tracer = Tracer(scene)
     seen, _ = seen_by(scene, tracer)
-    image = residual(tracer, scene.spotlight, seen, SIZE, VplLimits(0.2), samples=samples, block=4)
+    image = trace_residual(PixelJob(tracer, seen, SIZE, 4), VplLimits(0.2), samples=samples)
     for y, x in ((0, 0), (3, 5), (28, 44)):
         assert image[y : y + 4, x : x + 4, 3].mean() == 1
 
@@ -215,20 +215,20 @@ def test_the_background_and_no_clamp_have_no_residual():
     ball = build(sphere(0.5), plane(0.6, -0.5), camera=Camera((0.0, 0.5, 3.0), (0.0, 0.0, 0.0)))
     tracer = Tracer(ball)
     seen, hits = seen_by(ball, tracer)
-    image = residual(tracer, ball.spotlight, seen, SIZE, VplLimits(0.5), samples=4, block=4)
+    image = trace_residual(PixelJob(tracer, seen, SIZE, 4), VplLimits(0.5), samples=4)
     np.testing.assert_array_equal(image[..., 3] > 0, hits.hit.reshape(SIZE[1], SIZE[0]))
     assert (image[~hits.hit.reshape(SIZE[1], SIZE[0])] == 0).all()
     assert image[..., :3].max() > 0
-    assert not residual(tracer, ball.spotlight, seen, SIZE, VplLimits(0.0), samples=4, block=4).any()
+    assert not trace_residual(PixelJob(tracer, seen, SIZE, 4), VplLimits(0.0), samples=4).any()
     nothing = Surfaces(np.zeros(0, int), *[np.zeros((0, 3), np.float32)] * 3)
-    assert not residual(tracer, ball.spotlight, nothing, SIZE, VplLimits(0.5), samples=0.25, block=4).any()
+    assert not trace_residual(PixelJob(tracer, nothing, SIZE, 4), VplLimits(0.5), samples=0.25).any()
 
 
 def test_where_no_ray_meets_anything_further_bounces_bring_nothing():
     floor = build(plane(), camera=Camera((0.0, 2.0, 0.1), (0.0, 0.0, 0.0)))
     tracer = Tracer(floor)
     seen, _ = seen_by(floor, tracer)
-    image = residual(tracer, floor.spotlight, seen, SIZE, VplLimits(0.5), samples=1, block=4, bounces=3)
+    image = trace_residual(PixelJob(tracer, seen, SIZE, 4), VplLimits(0.5), samples=1, bounces=3)
     assert (image[..., 3] == 1).any()
     assert (image[..., :3] == 0).all()
 
@@ -253,7 +253,7 @@ def test_no_light_comes_from_behind_the_face():
     tilted = np.array([0.8, 0.6, 0.0], np.float32)
     up = np.array([0, 1, 0], np.float32)
     seen = Surfaces(np.arange(256), np.zeros((256, 3), np.float32), *(np.tile(n, (256, 1)) for n in (up, tilted)))
-    image = residual(Tracer(scene), light, seen, (16, 16), VplLimits(5.0), samples=16, block=4)
+    image = trace_residual(PixelJob(Tracer(scene), seen, (16, 16), 4), VplLimits(5.0), samples=16)
     assert not image[..., :3].any()
 
 

@@ -25,11 +25,11 @@ def disc_of(fov):
 def test_points_and_directions_are_each_others_reverse(fov):
     light, emission = disc_of(fov)
     points = 0.999 * square_to_disc(np.random.default_rng(1).random((1000, 2)))
-    directions = emission.directions(points)
+    directions = emission.unproject(points)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1)
     assert emission.inside(directions).all()
-    np.testing.assert_allclose(emission.points(directions), points, atol=1e-7)
-    np.testing.assert_allclose(emission.directions(np.zeros((1, 2))), light.axis[None])
+    np.testing.assert_allclose(emission.project(directions), points, atol=1e-7)
+    np.testing.assert_allclose(emission.unproject(np.zeros((1, 2))), light.axis[None])
 
 
 @pytest.mark.parametrize("fov", FOVS)
@@ -38,7 +38,7 @@ def test_a_part_of_the_disc_gets_its_share_of_the_light(fov):
     light, emission = disc_of(fov)
     even = unit_disc("sobol", 2**16, 0) * math.sin(math.radians(fov) / 2)
     directions = lift_to_hemisphere(even, light.axis[None])
-    points, sent = emission.points(directions), light.cone(directions) / len(even)
+    points, sent = emission.project(directions), light.cone(directions) / len(even)
     assert emission.power == pytest.approx(math.sin(math.radians(fov) / 2) ** 2 * mean_cone_factor(fov))
     inner = [sent[np.linalg.norm(points, axis=1) < radius].sum() / sent.sum() for radius in (0.3, 0.6, 0.9, 0.98)]
     np.testing.assert_allclose(inner, np.square([0.3, 0.6, 0.9, 0.98]), rtol=3e-3)

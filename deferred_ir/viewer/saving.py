@@ -1,6 +1,8 @@
 """Saves what is on screen: PNG, EXR, and a scene file that `deferred-ir render` renders to the same pixels.
 
-A graph that is not built in is written as well, whole and with the settings in it: its own file may change any time.
+A graph that renews its VPLs over many frames (`incremental`) shows what earlier frames left, which no file can hold:
+its scene file renders to other pixels, and says so. A graph that is not built in is written as well, whole and with the
+settings in it: its own file may change any time.
 """
 
 from __future__ import annotations
@@ -34,16 +36,25 @@ def save(session: Session, folder: Path) -> Path:
     stem = _find_free_stem(folder, session.scene.name)
     target = folder / f"{stem}.toml"
     check_folder(target)
-    image = session.settled()
+    image = session.image()
     image.save(folder / f"{stem}.png")
     image.save(folder / f"{stem}.exr")
     if not _is_builtin(session.graph):
         scene_file_writer.write_toml(folder / f"{stem}{GRAPH}", make_graph_tables(session.renderer.graph()))
-    frames = session.accumulation.frames if session.accumulation else 1
-    averaged = f" --accumulate {frames}" if frames > 1 else ""
-    comment = f"deferred-ir render {stem}.toml -o {stem}.png{averaged}"
-    scene_file_writer.write(target, describe_scene(session, stem), comment)
+    scene_file_writer.write(target, describe_scene(session, stem), _describe_command(session, stem))
     return target
+
+
+def _describe_command(session: Session, stem: str) -> str:
+    """Say how to render the scene file again, and how near that comes to the picture."""
+    frames = session.accumulation.frames if session.accumulation else 1
+    command = f"deferred-ir render {stem}.toml -o {stem}.png"
+    if frames > 1:
+        return f"{command} --accumulate {frames}"
+    fill = session.plan.frames_to_fill
+    if fill == 1:
+        return command
+    return f"{command} --frames {fill}\nOther pixels than {stem}.png: its VPLs are those that earlier frames left."
 
 
 def _find_free_stem(folder: Path, name: str) -> str:

@@ -274,14 +274,6 @@ class Session:
         """The picture on screen."""
         return self.renderer.read(self.plan)
 
-    def settled(self) -> Image:
-        """The same, where passes keep something from frame to frame, as a first frame has it."""
-        if self.accumulation is None:
-            self.renderer.reset()
-            self.moved()
-            self._draw()
-        return self.image()
-
     def exposure(self) -> float | None:
         """Stops of the picture on screen where its exposure is automatic, else None."""
         plan = self.plan

@@ -29,9 +29,7 @@ if TYPE_CHECKING:
     from deferred_ir.profiling.checks import extremes, visibility
     from deferred_ir.scene.scene import RenderDefaults, Scene
 
-HELP = (
-    "Stress-test the renderer: about 100 extreme variants of a scene; exit status 1 if one fails. Or maps against rays."
-)
+HELP = "Stress-test the renderer with about 100 extreme variants of a scene; exit status 1 if one fails."
 ORDER = 50
 VPL_SIZE = "shadow_maps.vpl_size"
 
@@ -39,7 +37,7 @@ VPL_SIZE = "shadow_maps.vpl_size"
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of `deferred-ir check`; most are None unless given, since only --visibility takes them."""
     parser.add_argument("scene", nargs="?", metavar="SCENE", help=f"{SCENE} (default: all built-in scenes)")
-    visibility = "instead: how often shadow maps and rays disagree; the options down to --set are for this alone"
+    visibility = "instead: count where shadow maps and rays disagree; the options down to --set are for this alone"
     parser.add_argument("--visibility", action="store_true", help=visibility)
     parser.add_argument("--sizes", metavar="N,N", help="of VPLs' maps, texels (default: 256,512)")
     pairs = "pairs of a pixel and a light in each row (default: 200000)"

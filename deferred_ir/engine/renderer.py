@@ -28,6 +28,7 @@ from deferred_ir.graph.graph import Graph, Plan
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.output.image import Image
 from deferred_ir.rays.tracer import Tracer
+from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
 
 IMAGES = {"radiance": ("rgba32f", "rgba16f"), "display": ("rgba8",)}
@@ -171,7 +172,7 @@ class Renderer:
             raise SettingError("Renderer: is closed; make a new one")
         with self.gpu.ctx:
             start = clock.perf_counter()
-            placed = scene.at(time).centred
+            placed = recentre(scene.at(time))
             moved = clock.perf_counter()
             self._upload(placed)
             assert self._buffers
@@ -237,7 +238,7 @@ class Renderer:
         self._scene = scene
 
     def tracer(self) -> Tracer:
-        """Embree over the scene drawn last, in the coordinates of `Scene.centred`, built when first asked for."""
+        """Embree over the scene drawn last, in the coordinates of `recentre`, built when first asked for."""
         assert self._scene, "no scene was drawn yet"
         if self._tracer is None:
             self._tracer = Tracer(self._scene)

@@ -89,7 +89,7 @@ class SceneBuffers:
     @cached_property
     def _own(self) -> PosedMesh:
         mesh = MapMesh.of(self._geometry)
-        return mesh.posed(mesh.clustered(), self._geometry.poses)
+        return mesh.pose(mesh.clustered(), self._geometry.poses)
 
     @property
     def clusters(self) -> Clusters:
@@ -114,7 +114,7 @@ class SceneBuffers:
         if key not in self._clustered:
             mesh, poses = make(), self._geometry.poses
             self._buffers.append(self.gpu.ctx.buffer(np.ascontiguousarray(mesh.positions, "f4").tobytes()))
-            made = ClusterBuffers(self.gpu, mesh.posed(cluster(mesh), poses), self._buffers[-1])
+            made = ClusterBuffers(self.gpu, mesh.pose(cluster(mesh), poses), self._buffers[-1])
             for number, pose in enumerate(poses):
                 made.move(number, pose)
             self._clustered[key] = made
@@ -130,7 +130,7 @@ class SceneBuffers:
                 if array is not None:
                     part = np.ascontiguousarray(array[vertices], "f4")
                     self._attributes[name][0].write(part.tobytes(), offset=12 * vertices.start)
-            for faces in _runs(geometry.faces_of[number]):
+            for faces in _runs(geometry.faces_of_models[number]):
                 self._faces.write(_face_records(geometry, faces).tobytes(), offset=16 * faces.start)
             if "_own" in self.__dict__:
                 self._own.move(number, geometry.poses[number])

@@ -15,7 +15,8 @@ from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.base.errors import DeviceError
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.scene import Scene, moved
+from deferred_ir.scene.recentre import recentre, translate_view
+from deferred_ir.scene.scene import Scene
 
 if TYPE_CHECKING:
     from deferred_ir.rays.tracer import Tracer
@@ -37,10 +38,10 @@ def fitted(scene: Scene, camera: bool, spotlight: bool) -> Scene:
     """`scene` with its camera and its spotlight replaced by chosen ones, as the two flags say; fills Scene.chosen."""
     if not (camera or spotlight):
         return scene
-    near, reasons = _chosen(scene.at(0).centred, camera, spotlight)
+    near, reasons = _chosen(recentre(scene.at(0)), camera, spotlight)
     by = scene.geometry.centre
     views: dict[str, Any] = {"camera": near.camera, "spotlight": near.spotlight}
-    views = {name: moved(views[name], by) if any(by) else views[name] for name in reasons}
+    views = {name: translate_view(views[name], by) if any(by) else views[name] for name in reasons}
     return replace(scene, **views, chosen={name: _plain(views[name], why) for name, why in reasons.items()})
 
 

@@ -17,7 +17,14 @@ from deferred_ir.base.image_size import parse_size
 from deferred_ir.base.toml_tables import Faults, Table, read_toml
 from deferred_ir.scene.camera import Camera, view_fault
 from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.motion import CameraMotion, KeyframedSpotlight, LissajousMotion, ModelMotion, SpotlightMotion
+from deferred_ir.scene.motion import (
+    CameraMotion,
+    KeyframedSpotlight,
+    LissajousMotion,
+    ModelMotion,
+    SpotlightMotion,
+    ViewKeyframes,
+)
 from deferred_ir.scene.scene import RenderDefaults
 
 KINDS = ("lissajous", "keyframes")
@@ -122,7 +129,7 @@ def _camera_motion(camera: Table, up: Vec3) -> CameraMotion | None:
         return None
     for index, (position, look_at) in enumerate(zip(path.positions, path.look_ats, strict=True)):
         _check_view(table, f"look_ats[{index}]", position, look_at, up)
-    return path
+    return CameraMotion(path.times, path.positions, path.look_ats)
 
 
 def _spotlight(root: Table) -> Spotlight | None:
@@ -167,13 +174,13 @@ def _spotlight_motion(spotlight: Table) -> SpotlightMotion | None:
     return KeyframedSpotlight(path.times, path.positions, path.look_ats)
 
 
-def _keyframes(table: Table) -> CameraMotion | None:
-    """Times, positions and look_ats; those of a spotlight have the same shape."""
+def _keyframes(table: Table) -> ViewKeyframes | None:
+    """Read times, positions and look_ats of a camera or a spotlight."""
     times = table.times()
     positions, look_ats = table.vec3s("positions", times), table.vec3s("look_ats", times)
     if times is None or positions is None or look_ats is None:
         return None
-    return CameraMotion(times, positions, look_ats)
+    return ViewKeyframes(times, positions, look_ats)
 
 
 def _fov(table: Table, default: float) -> float:

@@ -10,7 +10,7 @@ from deferred_ir.base.files import write_whole
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.motion import CameraMotion, LissajousMotion, ModelMotion, SpotlightMotion
+from deferred_ir.scene.motion import LissajousMotion, ModelMotion, SpotlightMotion, ViewKeyframes
 from deferred_ir.scene.scene import RenderDefaults
 
 
@@ -93,8 +93,7 @@ def _make_spotlight_motion(motion: SpotlightMotion) -> dict[str, Any]:
     return {"kind": "keyframes", **_make_keyframes(motion)}
 
 
-def _make_keyframes(motion: Any) -> dict[str, Any]:
-    path: CameraMotion = motion  # a spotlight's keyframes have the same fields
+def _make_keyframes(path: ViewKeyframes) -> dict[str, Any]:
     return {
         "times": list(path.times),
         "positions": [list(point) for point in path.positions],

@@ -9,7 +9,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.meshes.clusters import Clusters
-from deferred_ir.scene.geometry import Geometry, carried, groups, middle
+from deferred_ir.scene.geometry import Geometry, find_groups, find_middle, transform_points
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,14 +23,14 @@ class MapMesh:
     @cached_property
     def groups(self) -> Ints:
         """Whose each face is, int (F,): 0 of what stands still, i + 1 of moving model i."""
-        return groups(self.faces, self.moving)
+        return find_groups(self.faces, self.moving)
 
     @cached_property
     def local(self) -> Array:
         """Positions, those of each moving model about its own middle: 32 bits are finest there."""
         local = self.positions.copy()
         for vertices in self.moving:
-            local[vertices] -= middle(local[vertices])
+            local[vertices] -= find_middle(local[vertices])
         return local
 
     @classmethod
@@ -43,7 +43,7 @@ class MapMesh:
         """In clusters, none with triangles of two models that move apart. Those of moving models have no place yet."""
         return Clusters(self.local, self.faces, groups=self.groups if self.moving else None)
 
-    def posed(self, clusters: Clusters, poses: Array) -> PosedMesh:
+    def pose(self, clusters: Clusters, poses: Array) -> PosedMesh:
         """In these clusters, its moving models brought from rest by `poses` (m, 4, 4)."""
         return PosedMesh(self, clusters, poses)
 
@@ -77,7 +77,7 @@ class PosedMesh:
     def move(self, number: int, pose: Array) -> tuple[int, Array]:
         """Bring moving model `number` from rest by `pose` (4, 4): its first vertex, and all of them, float32 (n, 3)."""
         part = self._parts[number]
-        points = carried(part.rest, pose).astype(np.float32)
+        points = transform_points(part.rest, pose).astype(np.float32)
         if part.clusters.stop > part.clusters.start:
             self.clusters.move(part.clusters, points[part.corners])
         return self.mesh.moving[number].start, points

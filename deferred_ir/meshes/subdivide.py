@@ -14,7 +14,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.errors import GraphError
 from deferred_ir.meshes.posed import MapMesh
-from deferred_ir.scene.geometry import middle
+from deferred_ir.scene.geometry import find_middle
 
 MOST = 2_000_000
 """Triangles; more are refused before they are made."""
@@ -51,8 +51,8 @@ def subdivided(mesh: MapMesh, longest: float) -> MapMesh:
     parts = [subdivide(mesh.positions, mesh.faces[mesh.groups == 0], longest)]
     for number, vertices in enumerate(mesh.moving, start=1):
         own, faces = mesh.positions[vertices], mesh.faces[mesh.groups == number] - vertices.start
-        points, faces = subdivide(own - middle(own), faces, longest)
-        parts.append((points + middle(own), faces))
+        points, faces = subdivide(own - find_middle(own), faces, longest)
+        parts.append((points + find_middle(own), faces))
     starts = np.cumsum([0, *(len(points) for points, _ in parts)]).tolist()
     return MapMesh(
         np.concatenate([points for points, _ in parts]),

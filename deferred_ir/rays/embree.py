@@ -13,7 +13,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.errors import DeviceError
-from deferred_ir.scene.geometry import Geometry, middle
+from deferred_ir.scene.geometry import Geometry, find_middle
 
 INFINITE = 1e37
 """What Embree is told for no end."""
@@ -59,10 +59,10 @@ class Rays:
         self._scene = _embree(geometry.positions, faces)
         rest = geometry.rest
         self._centres, self._models = list[Array](), list[Any]()
-        for model, own in zip(rest.moving, rest.faces_of, strict=True):
+        for model, own in zip(rest.moving, rest.faces_of_models, strict=True):
             # In coordinates about its own middle: 32 bits are finest there.
             at = rest.positions[model.vertices]
-            self._centres.append(middle(at))
+            self._centres.append(find_middle(at))
             self._models.append(_embree(at - self._centres[-1], rest.faces[own] - model.first_vertex))
         self._bodies: list[_Body] = []
         self.pose(geometry)
@@ -75,7 +75,7 @@ class Rays:
             slack = SLACK * (np.abs([low, high]).max() + np.linalg.norm(high - low))
             turn = pose[:3, :3].T
             shift = -turn @ pose[:3, 3] - self._centres[i]
-            faces = geometry.faces_of[i]
+            faces = geometry.faces_of_models[i]
             self._bodies.append(_Body(self._models[i], faces, np.stack([low - slack, high + slack]), turn, shift))
 
     def closest(self, origins: Array, ways: Array, reach: Array | None = None) -> tuple[Ints, Array, Array]:

@@ -7,7 +7,7 @@ Pixel (0, 0) is the top left one of an image; its centre lies half a pixel insid
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -72,5 +72,8 @@ class Camera:
         return directions
 
     def at(self, time: float) -> Camera:
-        """The camera at `time` seconds of its motion."""
-        return self.motion.camera(self, time) if self.motion else self
+        """Return the camera where it is at `time` seconds of its motion."""
+        if self.motion is None:
+            return self
+        position, look_at = self.motion.move(self.position, self.look_at, time)
+        return replace(self, position=position, look_at=look_at)

@@ -1,26 +1,25 @@
-"""The triangles of a scene, and where its moving models put them. No OpenGL.
+"""The triangles of a scene at rest and with its moving models posed.
 
-A model moves as a whole, so of a moved scene only the vertices and the normals of its moving models are new.
+A model moves as a whole, so posing it changes the vertices and the normals of moving models and nothing else.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints, Vec3
-from deferred_ir.scene.large_triangles import graded
 from deferred_ir.scene.motion import ModelMotion
 
 FAR = 4.0
-"""Scenes farther than this many times their `scale` from the origin are moved to it before 32 bits hold them."""
+"""A scene whose middle is farther from the origin than this many times its `scale` gets a `centre` of its own."""
 OUTLYING = 16.0
-"""Things farther out than this many times the median distance of vertices from their middle leave `scale` as it is."""
+"""Vertices farther from the middle than this many times the median distance do not count in `scale`."""
 SAMPLES = 1 << 16
-"""Corners of faces at most that medians are taken of."""
+"""Most corners of faces of which medians are taken."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +36,20 @@ class Model:
 
     @property
     def vertices(self) -> slice:
-        """Its vertices among all."""
+        """The slice of its vertices among all vertices of the scene."""
         return slice(self.first_vertex, self.first_vertex + self.vertex_count)
+
+
+@dataclass(eq=False)
+class _LastPose:
+    """The pose that a geometry was put in last, so that the same pose is the same object."""
+
+    geometry: PosedGeometry | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """All triangles of a scene, indexed.
+    """All triangles of a scene, indexed, with moving models at rest, where their files put them.
 
     positions: float64 (V, 3).
     faces: int32 (F, 3), counter-clockwise from the front.
@@ -53,8 +59,8 @@ class Geometry:
         None if no vertex has one.
     uvs: float32 (V, 2), or None if no material has a texture.
     colors: float32 (V, 3) linear vertex colours that multiply the albedo, or None.
-    moving: the models that have a motion; `positions` are where their files put them, or where `posed` did.
-    medians: `middle` and `spread` where they are not to be taken from the faces.
+    moving: the models that have a motion.
+    medians: overrides `middle` and `spread`, which are otherwise computed from the faces.
     """
 
     positions: Array
@@ -65,96 +71,101 @@ class Geometry:
     colors: Array | None = None
     moving: tuple[Model, ...] = ()
     medians: tuple[Array, float] | None = None
-    _rest: Geometry | None = None
-    _poses: Array | None = None
-    _last: list[Geometry] = field(default_factory=list, init=False)
+    _last_pose: _LastPose = field(default_factory=_LastPose, init=False, repr=False)
 
     @property
     def rest(self) -> Geometry:
-        """What was posed, itself where it rests: faces, materials and all that does not move are the same arrays."""
-        return self._rest or self
+        """The geometry with all models at rest; posing shares every array with it that does not change."""
+        return self
 
     @property
     def poses(self) -> Array:
-        """Rigid transforms that have brought the moving models from rest to where they are, float64 (m, 4, 4)."""
-        return np.tile(np.eye(4), (len(self.moving), 1, 1)) if self._poses is None else self._poses
+        """Rigid transforms of the moving models from rest to where they are, float64 (m, 4, 4)."""
+        return np.tile(np.eye(4), (len(self.moving), 1, 1))
 
     @property
     def moves(self) -> bool:
-        """Whether `at` gives anything else than itself: what is posed stays."""
-        return bool(self.moving) and self._rest is None
+        """Whether `at` depends on the time."""
+        return bool(self.moving)
 
     def at(self, time: float) -> Geometry:
-        """With all models where they are at `time` seconds; what is posed already stays."""
-        if not self.moves:
+        """Return the geometry with all models where they are at `time` seconds; itself where none moves."""
+        if not self.moving:
             return self
-        return self.posed(np.stack([model.motion.matrix(time) for model in self.moving if model.motion]))
+        return self.pose(np.stack([model.motion.matrix(time) for model in self.moving if model.motion]))
 
-    def posed(self, poses: Array) -> Geometry:
-        """With the moving models brought from rest by `poses` (m, 4, 4). The same object as last time if these are."""
-        rest = self.rest
-        for last in rest._last[:1]:  # taken once: another thread may pose it meanwhile
-            if np.array_equal(last.poses, poses):
-                return last
-        positions, normals = rest.positions.copy(), None if rest.normals is None else rest.normals.copy()
-        for model, pose in zip(rest.moving, poses, strict=True):
-            positions[model.vertices] = carried(rest.positions[model.vertices], pose)
+    def pose(self, poses: Array) -> PosedGeometry:
+        """Return the geometry with its moving models brought from rest by `poses` (m, 4, 4).
+
+        It is the same object as last time if the poses are equal.
+        """
+        last = self._last_pose.geometry  # read once: another thread may pose this geometry meanwhile
+        if last is not None and np.array_equal(last.poses, poses):
+            return last
+        positions, normals = self.positions.copy(), None if self.normals is None else self.normals.copy()
+        for model, matrix in zip(self.moving, poses, strict=True):
+            positions[model.vertices] = transform_points(self.positions[model.vertices], matrix)
             if normals is not None:
-                normals[model.vertices] = normals[model.vertices] @ pose[:3, :3].T
-        made = replace(rest, positions=positions, normals=normals, _rest=rest, _poses=poses)
-        rest._last[:] = [made]
-        return made
-
-    @cached_property
-    def faces_of(self) -> tuple[Ints, ...]:
-        """The faces of each moving model, int (n,) each, ascending."""
-        if self._rest:
-            return self._rest.faces_of
-        return tuple(np.flatnonzero(self.groups == i + 1) for i in range(len(self.moving)))
+                normals[model.vertices] = normals[model.vertices] @ matrix[:3, :3].T
+        posed = PosedGeometry(
+            positions,
+            self.faces,
+            self.face_materials,
+            normals,
+            self.uvs,
+            self.colors,
+            self.moving,
+            _rest=self,
+            _poses=poses,
+        )
+        self._last_pose.geometry = posed
+        return posed
 
     @cached_property
     def groups(self) -> Ints:
-        """Whose each face is, int (F,): 0 of what stands still, i + 1 of moving model i."""
-        return self._rest.groups if self._rest else groups(self.faces, [model.vertices for model in self.moving])
+        """Which model moves each face, int (F,): 0 for none, i + 1 for moving model i."""
+        return find_groups(self.faces, [model.vertices for model in self.moving])
+
+    @cached_property
+    def faces_of_models(self) -> tuple[Ints, ...]:
+        """The faces of each moving model, int (n,) each, ascending."""
+        return tuple(np.flatnonzero(self.groups == i + 1) for i in range(len(self.moving)))
 
     @cached_property
     def boxes(self) -> Array:
         """Corners (minimum, maximum) of each moving model where it is, float64 (m, 2, 3)."""
-        found = [corners(self.positions[model.vertices]) for model in self.moving]
-        return np.reshape(found, (len(found), 2, 3))
+        boxes = [find_bounds(self.positions[model.vertices]) for model in self.moving]
+        return np.reshape(boxes, (len(boxes), 2, 3))
 
     @cached_property
     def face_normals(self) -> Array:
         """Unit geometric normals by winding, float64 (F, 3); +y for a degenerate face, which covers no pixel."""
-        if not self._rest:
-            return _face_normals(self.positions, self.faces)
-        normals = self._rest.face_normals.copy()
-        for faces in self.faces_of:
-            normals[faces] = _face_normals(self.positions, self.faces[faces])
-        return normals
+        return _compute_face_normals(self.positions, self.faces)
 
     @cached_property
     def bounds(self) -> Array:
         """Corners (minimum, maximum) of all vertices that faces use, float64 (2, 3)."""
-        return corners(self.positions[np.unique(self.faces)])
+        return find_bounds(self.positions[np.unique(self.faces)])
 
     @cached_property
     def extent(self) -> Array:
-        """Corners of a box that is the same wherever the models are: `bounds` where none moves, float64 (2, 3).
+        """Corners of a box that does not depend on the time, float64 (2, 3): `bounds` where no model moves.
 
-        It holds what stands still, and the moving models at each of their keyframes.
+        It encloses everything static, and the moving models at each of their keyframes.
         """
-        if self._rest:
-            return self._rest.extent
         if not self.moving:
             return self.bounds
-        still = np.unique(self.faces[self.groups == 0])
-        boxes = [corners(self.positions[still])] if len(still) else []
-        for model, faces in zip(self.moving, self.faces_of, strict=True):
+        static = np.unique(self.faces[self.groups == 0])
+        boxes = [find_bounds(self.positions[static])] if len(static) else []
+        for model, faces in zip(self.moving, self.faces_of_models, strict=True):
             used = self.positions[np.unique(self.faces[faces])]
             assert model.motion
-            boxes += [corners(carried(used, model.motion.matrix(time))) for time in model.motion.times if len(used)]
-        return corners(np.concatenate(boxes))
+            boxes += [
+                find_bounds(transform_points(used, model.motion.matrix(time)))
+                for time in model.motion.times
+                if len(used)
+            ]
+        return find_bounds(np.concatenate(boxes))
 
     @cached_property
     def diagonal(self) -> float:
@@ -163,90 +174,130 @@ class Geometry:
 
     @cached_property
     def middle(self) -> Array:
-        """The median of the corners of faces, which things far out hardly move, float64 (3,); the same at all times."""
-        return self._rest.middle if self._rest else self.medians[0] if self.medians else np.median(self._some, axis=0)
+        """The median of the corners of faces, float64 (3,), which outliers hardly move; the same at all times."""
+        return self.medians[0] if self.medians else np.median(self._sampled_corners, axis=0)
 
     @cached_property
     def spread(self) -> float:
-        """The median of the distances of the corners of faces from the middle; the same at all times."""
-        if self._rest:
-            return self._rest.spread
+        """The median distance of the corners of faces from the middle; the same at all times."""
         if self.medians:
             return self.medians[1]
-        return float(np.median(np.linalg.norm(self._some - self.middle, axis=1)))
+        return float(np.median(np.linalg.norm(self._sampled_corners - self.middle, axis=1)))
 
     @property
-    def _some(self) -> Array:
-        """Corners of faces, (n, 3): all, or SAMPLES of very many, with moving models at their first keyframes."""
+    def _sampled_corners(self) -> Array:
+        """Corners of faces, (n, 3): all or, of very many, SAMPLES, with moving models at their first keyframes."""
         used = self.faces.ravel()
         first = [model.motion.matrix(model.motion.times[0]) for model in self.moving if model.motion]
-        positions = self.posed(np.stack(first)).positions if first else self.positions
+        positions = self.pose(np.stack(first)).positions if first else self.positions
         return positions[used[:: -(-len(used) // SAMPLES)]]
 
     @cached_property
     def scale(self) -> float:
-        """What near planes and offsets are fractions of: the diagonal, unless a few things lie very far out."""
+        """The length of which near planes and offsets are fractions: the diagonal, unless a few things lie far out."""
         return min(self.diagonal, OUTLYING * self.spread) if self.spread > 0 else self.diagonal
 
     @cached_property
     def centre(self) -> Vec3:
-        """Where the origin of 32-bit coordinates lies: the middle of most where that is far off, else 0."""
+        """The origin of 32-bit coordinates: the middle where that is far from the world's origin, else 0."""
         middle = self.middle
         x, y, z = middle.tolist() if np.abs(middle).max() > FAR * self.scale else (0.0, 0.0, 0.0)
         return x, y, z
 
-    @cached_property
-    def centred(self) -> Geometry:
-        """The same as 32 bits hold it best: with `centre` as its origin, and without giant triangles (giants.py).
 
-        Itself where nothing has to be done. Both are done in 64 bits.
-        """
-        if not any(self.centre):
-            return self._graded
-        if self._rest:
-            poses = self.poses.copy()
-            poses[:, :3, 3] += poses[:, :3, :3] @ self.centre - self.centre
-            return self._rest.centred.posed(poses)
-        moving = tuple(
-            replace(model, motion=model.motion.seen_from(self.centre)) for model in self.moving if model.motion
-        )
-        middle = self.middle - self.centre
-        near = replace(self, positions=self.positions - self.centre, moving=moving, medians=(middle, self.spread))
-        return near._graded
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PosedGeometry(Geometry):
+    """A geometry whose moving models were brought from rest by `poses`; `Geometry.pose` makes it.
+
+    Whatever a pose does not change is taken from the geometry at rest. It stays as it is at all times.
+    """
+
+    _rest: Geometry
+    _poses: Array
 
     @property
-    def _graded(self) -> Geometry:
-        if self._rest:
-            whole = self._rest.centred
-            return self if whole is self._rest else whole.posed(self.poses)
-        return graded(self)
+    def rest(self) -> Geometry:
+        """The geometry with all models at rest; every array that posing does not change is shared with it."""
+        return self._rest
+
+    @property
+    def poses(self) -> Array:
+        """Rigid transforms of the moving models from rest to where they are, float64 (m, 4, 4)."""
+        return self._poses
+
+    @property
+    def moves(self) -> bool:
+        """False: what is posed stays."""
+        return False
+
+    def at(self, time: float) -> Geometry:
+        """Return itself: what is posed stays."""
+        del time
+        return self
+
+    def pose(self, poses: Array) -> PosedGeometry:
+        """Return the geometry in another pose, `poses` (m, 4, 4) from rest."""
+        return self._rest.pose(poses)
+
+    @cached_property
+    def groups(self) -> Ints:
+        """Which model moves each face, as at rest."""
+        return self._rest.groups
+
+    @cached_property
+    def faces_of_models(self) -> tuple[Ints, ...]:
+        """The faces of each moving model, as at rest."""
+        return self._rest.faces_of_models
+
+    @cached_property
+    def face_normals(self) -> Array:
+        """Unit geometric normals, float64 (F, 3); only those of moving models are computed."""
+        normals = self._rest.face_normals.copy()
+        for faces in self.faces_of_models:
+            normals[faces] = _compute_face_normals(self.positions, self.faces[faces])
+        return normals
+
+    @cached_property
+    def extent(self) -> Array:
+        """Corners of the box that does not depend on the time, float64 (2, 3)."""
+        return self._rest.extent
+
+    @cached_property
+    def middle(self) -> Array:
+        """The median of the corners of faces, float64 (3,); the same at all times."""
+        return self._rest.middle
+
+    @cached_property
+    def spread(self) -> float:
+        """The median distance of the corners of faces from the middle; the same at all times."""
+        return self._rest.spread
 
 
-def corners(points: Array) -> Array:
-    """Minimum and maximum of points (n, 3), (2, 3)."""
+def find_bounds(points: Array) -> Array:
+    """Return the minimum and maximum of points (n, 3), (2, 3)."""
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
-def middle(points: Array) -> Array:
-    """Of the box about points (n, 3), (3,); 0 where there are none."""
-    return corners(points).mean(axis=0) if len(points) else np.zeros(3)
+def find_middle(points: Array) -> Array:
+    """Return the middle of the box around points (n, 3), (3,); 0 where there are none."""
+    return find_bounds(points).mean(axis=0) if len(points) else np.zeros(3)
 
 
-def carried(points: Array, pose: Array) -> Array:
-    """Points (n, 3) brought along by a rigid transform (4, 4), float64 (n, 3)."""
-    moved: Array = points @ pose[:3, :3].T + pose[:3, 3]
-    return moved
+def transform_points(points: Array, matrix: Array) -> Array:
+    """Transform points (n, 3) by a rigid transform (4, 4), float64 (n, 3)."""
+    transformed: Array = points @ matrix[:3, :3].T + matrix[:3, 3]
+    return transformed
 
 
-def groups(faces: Ints, ranges: Sequence[slice]) -> Ints:
-    """Whose each of `faces` (F, 3) is, int (F,): i + 1 where its vertices lie in ranges[i], 0 where in none."""
-    found = np.zeros(len(faces), np.intp)
+def find_groups(faces: Ints, ranges: Sequence[slice]) -> Ints:
+    """Return the group of each of `faces` (F, 3), int (F,): i + 1 where its vertices lie in ranges[i], 0 elsewhere."""
+    groups = np.zeros(len(faces), np.intp)
     for number, vertices in enumerate(ranges, start=1):
-        found[(faces[:, 0] >= vertices.start) & (faces[:, 0] < vertices.stop)] = number
-    return found
+        groups[(faces[:, 0] >= vertices.start) & (faces[:, 0] < vertices.stop)] = number
+    return groups
 
 
-def _face_normals(positions: Array, faces: Ints) -> Array:
+def _compute_face_normals(positions: Array, faces: Ints) -> Array:
     a, b, c = (positions[faces[:, i]] for i in range(3))
     # Edges scaled to about 1 first: the product of two tiny edges must not underflow.
     ab, ac = b - a, c - a

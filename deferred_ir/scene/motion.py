@@ -1,24 +1,19 @@
-"""Motions of camera, spotlight and models: what `[*.motion]` of a scene file says, evaluated at a time in seconds."""
+"""Motions of camera, spotlight and models (the `motion` tables of a scene file), evaluated at a time in seconds."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Vec3
 
-if TYPE_CHECKING:
-    from deferred_ir.scene.camera import Camera
-    from deferred_ir.scene.lights.spot import Spotlight
-
 FRAMES_PER_SECOND = 30
 
 
 def spline(times: tuple[float, ...], points: tuple[Vec3, ...], time: float) -> Vec3:
-    """A natural cubic spline through `points` at `times`; it rests at both ends."""
+    """Evaluate the natural cubic spline through `points` at `times`; before and after them it stays at the ends."""
     time = float(np.clip(time, times[0], times[-1]))
     if len(times) == 1:
         return points[0]
@@ -29,20 +24,25 @@ def spline(times: tuple[float, ...], points: tuple[Vec3, ...], time: float) -> V
 
 
 @dataclass(frozen=True)
-class CameraMotion:
+class ViewKeyframes:
     """Splines through positions and look_ats (world space) at times (seconds, ascending)."""
 
     times: tuple[float, ...]
     positions: tuple[Vec3, ...]
     look_ats: tuple[Vec3, ...]
 
-    def camera(self, camera: Camera, time: float) -> Camera:
-        """`camera`, moved to where it is at `time`."""
-        return replace(
-            camera,
-            position=spline(self.times, self.positions, time),
-            look_at=spline(self.times, self.look_ats, time),
-        )
+    def move(self, position: Vec3, look_at: Vec3, time: float) -> tuple[Vec3, Vec3]:
+        """Return position and look_at at `time`; those of the view at rest do not matter."""
+        del position, look_at
+        return spline(self.times, self.positions, time), spline(self.times, self.look_ats, time)
+
+
+class CameraMotion(ViewKeyframes):
+    """Keyframes of a camera."""
+
+
+class KeyframedSpotlight(ViewKeyframes):
+    """Keyframes of a spotlight."""
 
 
 @dataclass(frozen=True)
@@ -52,33 +52,16 @@ class LissajousMotion:
     amplitude: Vec3
     speed: tuple[float, float]
 
-    def spotlight(self, light: Spotlight, time: float) -> Spotlight:
-        """`light`, moved to where it is at `time`; it keeps aiming at its look_at."""
+    def move(self, position: Vec3, look_at: Vec3, time: float) -> tuple[Vec3, Vec3]:
+        """Return position and look_at at `time`, from the position at rest; look_at stays."""
         (ax, ay, az), (w_xz, w_y) = self.amplitude, self.speed
-        x, y, z = light.position
+        x, y, z = position
         moved = (
             x + ax * math.cos(time * w_xz),
             y + ay * math.cos(time * w_y),
             z + az * math.sin(time * w_xz),
         )
-        return replace(light, position=moved)
-
-
-@dataclass(frozen=True)
-class KeyframedSpotlight:
-    """Splines through positions and look_ats (world space) at times (seconds, ascending)."""
-
-    times: tuple[float, ...]
-    positions: tuple[Vec3, ...]
-    look_ats: tuple[Vec3, ...]
-
-    def spotlight(self, light: Spotlight, time: float) -> Spotlight:
-        """`light`, moved to where it is at `time`."""
-        return replace(
-            light,
-            position=spline(self.times, self.positions, time),
-            look_at=spline(self.times, self.look_ats, time),
-        )
+        return moved, look_at
 
 
 SpotlightMotion = LissajousMotion | KeyframedSpotlight
@@ -88,7 +71,8 @@ SpotlightMotion = LissajousMotion | KeyframedSpotlight
 class ModelMotion:
     """Keyframes of a rigid motion: translations and unit quaternions (x, y, z, w) at times (seconds, ascending).
 
-    It turns about the world's origin. origin: where in the world the coordinates begin that it is asked in.
+    Rotations are about the world's origin. origin: the world position of the origin of the coordinates that `matrix`
+    transforms.
     """
 
     times: tuple[float, ...]
@@ -96,13 +80,13 @@ class ModelMotion:
     rotations: tuple[tuple[float, float, float, float], ...]
     origin: Vec3 = field(default=(0.0, 0.0, 0.0), repr=False)
 
-    def seen_from(self, origin: Vec3) -> ModelMotion:
-        """The same in coordinates that begin at `origin`."""
+    def shift_origin(self, origin: Vec3) -> ModelMotion:
+        """Return the same motion in coordinates whose origin lies at `origin` in the present ones."""
         (x, y, z), (u, v, w) = self.origin, origin
         return replace(self, origin=(x + u, y + v, z + w))
 
-    def held(self, time: float) -> ModelMotion:
-        """A motion that rests where this one is at `time`."""
+    def freeze(self, time: float) -> ModelMotion:
+        """Return a motion that stays where this one is at `time`."""
         from scipy.spatial.transform import Rotation
 
         matrix = replace(self, origin=(0.0, 0.0, 0.0)).matrix(time)
@@ -111,7 +95,10 @@ class ModelMotion:
         return replace(self, times=(0.0,), translations=((x, y, z),), rotations=((i, j, k, w),))
 
     def matrix(self, time: float) -> Array:
-        """The 4x4 rigid transform at `time`: linear translation, spherical linear rotation; it rests at both ends."""
+        """Return the 4x4 rigid transform at `time`; before and after the keyframes it stays at the ends.
+
+        Translations are interpolated linearly, rotations spherically.
+        """
         from scipy.spatial.transform import Rotation, Slerp
 
         time = float(np.clip(time, self.times[0], self.times[-1]))

@@ -10,23 +10,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from deferred_ir.base.arrays import Vec3
 from deferred_ir.base.errors import SceneError, SettingError
 from deferred_ir.scene.camera import Camera, view_fault
 from deferred_ir.scene.geometry import Geometry, Model
 from deferred_ir.scene.lights.spot import Spotlight
-
-View = TypeVar("View", Camera, Spotlight)
-
-
-def moved(view: View, by: Vec3) -> View:
-    """A camera or a spotlight, at rest, in coordinates that differ by `by`."""
-    (x, y, z), (u, v, w), (a, b, c) = view.position, view.look_at, by
-    return replace(view, position=(x + a, y + b, z + c), look_at=(u + a, v + b, w + c), motion=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,23 +78,6 @@ class Scene:
         motions = tuple(model.motion for model in self.models)
         digest.update(repr((self.materials, self.camera, self.spotlight, motions)).encode())
         return digest.hexdigest()[:16]
-
-    @property
-    def centred(self) -> Scene:
-        """The scene as it stands, near the origin: what the GPU and Embree, which hold 32 bits, are given.
-
-        Itself where they can hold it as it is (see Geometry.centred). Camera and light rest where they are.
-        """
-        if self.geometry.centred is self.geometry:
-            return self
-        x, y, z = self.geometry.centre
-        by = (-x, -y, -z)
-        return replace(
-            self,
-            geometry=self.geometry.centred,
-            camera=moved(self.camera, by),
-            spotlight=moved(self.spotlight, by),
-        )
 
     @property
     def emits(self) -> bool:

@@ -17,6 +17,7 @@ from deferred_ir.base.files import check_folder, write_json, write_whole
 from deferred_ir.base.progress import Progress
 from deferred_ir.graph.file import load_graph
 from deferred_ir.rays.tracer import Tracer
+from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.path_tracer import PathTracer
 from deferred_ir.vpls.cast import NONE, cast
@@ -97,7 +98,7 @@ def reference(
     start = clock.perf_counter()
     tell: dict[str, Any] = {"scene": scene.name, "scene_hash": scene.hash, "size": list(size), "bounces": bounces}
     tell["time"] = time if scene.moves else 0.0
-    scene = scene.at(time).centred
+    scene = recentre(scene.at(time))
     paths = PathTracer(scene, Tracer(scene), bounces)
     if vpls is None:
         spp = DEFAULT_SPP if spp is None else spp

@@ -90,7 +90,7 @@ def _place_model(entry: ModelEntry, time: float) -> ModelEntry:
     """Return a model with its motion if it is where the motion begins, else at rest where it is at `time`."""
     motion = entry.motion
     if motion and not np.array_equal(motion.matrix(time), motion.matrix(0.0)):
-        motion = motion.held(time)
+        motion = motion.freeze(time)
     return replace(entry, path=entry.path.resolve(), motion=motion)
 
 

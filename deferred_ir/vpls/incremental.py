@@ -21,7 +21,7 @@ from deferred_ir.sampling import streams
 from deferred_ir.sampling.disc_voronoi import Cells, most_crowded
 from deferred_ir.sampling.warps import build_basis
 from deferred_ir.sampling.warps import square_to_disc as unit_disc
-from deferred_ir.scene.geometry import carried
+from deferred_ir.scene.geometry import transform_points
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.vpls.cast import Vpls
 from deferred_ir.vpls.emission_disc import EmissionDisc
@@ -108,7 +108,7 @@ class IncrementalVpls:
         moves = self._maps.follow(geometry)
         for number, move in moves.items():
             own = np.flatnonzero(self.landed & (self._group == number + 1))
-            self.position[own] = carried(self.position[own], move)
+            self.position[own] = transform_points(self.position[own], move)
             for normals in (self.normal, self.shading_normal):
                 normals[own] = normals[own] @ move[:3, :3].T
         self.used &= self._reached(light, tracer, disc) & (self._lag() <= FARTHEST * geometry.diagonal)

@@ -10,7 +10,8 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.scene import Scene, moved
+from deferred_ir.scene.recentre import recentre, translate_view
+from deferred_ir.scene.scene import Scene
 
 
 def same(scene: Scene) -> Scene:
@@ -59,7 +60,9 @@ def scaled(scene: Scene, factor: float) -> Scene:
 def shifted(scene: Scene, by: Vec3) -> Scene:
     """Elsewhere, all of it."""
     geometry = replace(scene.geometry, positions=scene.geometry.positions + by)
-    return replace(scene, geometry=geometry, camera=moved(scene.camera, by), spotlight=moved(scene.spotlight, by))
+    return replace(
+        scene, geometry=geometry, camera=translate_view(scene.camera, by), spotlight=translate_view(scene.spotlight, by)
+    )
 
 
 def brighter(scene: Scene, factor: float) -> Scene:
@@ -81,7 +84,7 @@ def looking_along_up(scene: Scene, angle: float) -> Scene:
 
 def wall(scene: Scene, place: Vec3, towards: Array) -> tuple[Array, Array]:
     """Where a ray first lands, and the normal there, towards it; the place itself where it lands nowhere."""
-    hits = Tracer(scene.centred).closest(np.subtract(place, scene.geometry.centre)[None], towards[None])
+    hits = Tracer(recentre(scene)).closest(np.subtract(place, scene.geometry.centre)[None], towards[None])
     if not hits.hit[0]:
         return np.asarray(place), -towards
     return hits.position[0] + scene.geometry.centre, hits.normal[0]

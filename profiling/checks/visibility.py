@@ -24,6 +24,7 @@ from deferred_ir.graph.params import specs
 from deferred_ir.profiling.checks.visibility_pass import FOLDER, VisibilityPairs
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
 from deferred_ir.shadows.settings import WIDEST_PLANAR, MapParams
 
@@ -108,7 +109,7 @@ def rows(scene: Scene, options: Options, progress: Progress | None = None) -> It
 
     None where the spotlight is dark. Raises GraphError before the first row for settings that do not fit any.
     """
-    scene = scene.centred  # as the maps and Embree have it
+    scene = recentre(scene)  # as the maps and Embree have it
     for settings, chosen in _planned(scene, options):
         with Renderer(options.size, GRAPH, options.device, set=settings, passes=PASSES) as renderer:
             for maps in chosen:

@@ -31,6 +31,7 @@ from deferred_ir.meshes.posed import PosedMesh
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.motion import ModelMotion
+from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.reference import reference
 
@@ -72,28 +73,28 @@ def test_the_same_pose_is_the_same_object():
     still = room()
     assert still.at(3.0).geometry is still.geometry
     far = move_away(scene)
-    assert far.at(7.0).centred.geometry is far.at(8.0).centred.geometry
+    assert recentre(far.at(7.0)).geometry is recentre(far.at(8.0)).geometry
 
 
 def test_a_pose_is_not_that_of_another_thread(monkeypatch):
     """The viewer poses the scene that plays while a reference of it is traced."""
     geometry, equal = room_with_moving_models().geometry, np.array_equal
     here, there = (np.stack([AROUND.matrix(time), UP.matrix(time)]) for time in (0.2, 0.9))
-    expected = geometry.posed(here)
+    expected = geometry.pose(here)
 
     def meanwhile(*arrays):
         monkeypatch.undo()
-        geometry.posed(there)
+        geometry.pose(there)
         return equal(*arrays)
 
     monkeypatch.setattr(np, "array_equal", meanwhile)
-    assert geometry.posed(here) is expected
+    assert geometry.pose(here) is expected
 
 
 def away_moving(scene: Scene, by: tuple[float, float, float]) -> Scene:
     """`scene` somewhere else, moving as it did."""
     models = tuple(
-        replace(model, motion=model.motion.seen_from((-by[0], -by[1], -by[2]))) if model.motion else model
+        replace(model, motion=model.motion.shift_origin((-by[0], -by[1], -by[2]))) if model.motion else model
         for model in scene.models
     )
     moving = tuple(model for model in models if model.motion)
@@ -110,7 +111,7 @@ def test_rays_meet_what_they_would_in_the_moved_scene(poses, seed, walls):
     meshes = (WALLS, BLOCK, BALL) if walls else (BLOCK, BALL)
     scene = build(*meshes, motions=(None, AROUND, UP)[3 - len(meshes) :])
     tracer = Tracer(scene.at(0.0))
-    geometry = scene.geometry.posed(np.stack([pose_matrix(3 * np.array(turn), shift) for turn, shift in poses]))
+    geometry = scene.geometry.pose(np.stack([pose_matrix(3 * np.array(turn), shift) for turn, shift in poses]))
     moved = replace(scene, geometry=geometry)
     tracer.follow(moved)
     fresh = Tracer(replace(scene, geometry=replace(scene.geometry, positions=geometry.positions, moving=())))
@@ -133,7 +134,7 @@ def test_rays_meet_what_they_would_in_the_moved_scene(poses, seed, walls):
 
 def test_rays_in_the_planes_of_a_box_are_not_lost():
     scene = build(box((0, 0, 0), (1, 1, 1)), motions=(AROUND,))
-    scene = replace(scene, geometry=scene.geometry.posed(np.eye(4)[None]))
+    scene = replace(scene, geometry=scene.geometry.pose(np.eye(4)[None]))
     tracer = Tracer(scene)
     origins = np.array([[-1, 0.5, 0.5], [0.5, 2, 0.5], [0.5, 0.5, 0.5], [2, 3, 0.5]])
     directions = np.array([[1.0, 0, 0], [0, -1, 0], [0, 0, 1], [0, -1, 0]])
@@ -284,7 +285,7 @@ def test_beside_a_ground_that_is_cut_up(renderer):
     """Giant triangles are split before 32 bits hold them; the faces of moving models are then others by number."""
     ground = plane(1e5, -1.0)
     scene = build(box((-1, -1, -1), (1, 1, 1)), ground, BLOCK, BALL, motions=(None, None, AROUND, UP), **VIEW)
-    assert len(scene.at(0.3).centred.geometry.faces) > len(scene.geometry.faces)
+    assert len(recentre(scene.at(0.3)).geometry.faces) > len(scene.geometry.faces)
     one, other = renderer(SIZE), renderer(SIZE)
     for time in (0.2, 0.6):
         found = one.render(scene, vpls=8, time=time).radiance

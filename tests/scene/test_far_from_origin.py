@@ -13,25 +13,26 @@ from deferred_ir import load
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.motion import CameraMotion
+from deferred_ir.scene.recentre import recentre
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.reference import reference
 
 
 def test_a_scene_near_the_origin_stays_as_it_is() -> None:
     scene = load("cornell")
-    assert scene.centred is scene
+    assert recentre(scene) is scene
     assert move_away(scene, (2.0, 0.0, 0.0)).geometry.centre == (0, 0, 0)
 
 
 def test_a_scene_far_away_is_moved_in_64_bits() -> None:
     scene, far = load("cornell"), move_away(load("cornell"))
-    centred = far.centred
+    near = recentre(far)
     middle = scene.geometry.middle
-    assert centred.centred is centred
-    assert centred.geometry.positions == pytest.approx(scene.geometry.positions - middle, abs=1e-10)
-    assert centred.camera.position == pytest.approx(np.subtract(scene.camera.position, middle), abs=1e-10)
-    assert centred.spotlight.look_at == pytest.approx(np.subtract(scene.spotlight.look_at, middle), abs=1e-10)
-    assert far.geometry.centred is centred.geometry  # uploaded once
+    assert recentre(near) is near
+    assert near.geometry.positions == pytest.approx(scene.geometry.positions - middle, abs=1e-10)
+    assert near.camera.position == pytest.approx(np.subtract(scene.camera.position, middle), abs=1e-10)
+    assert near.spotlight.look_at == pytest.approx(np.subtract(scene.spotlight.look_at, middle), abs=1e-10)
+    assert recentre(far).geometry is near.geometry  # uploaded once
 
 
 @pytest.mark.parametrize("graph", ["deferred", "accurate", "forward"])

@@ -13,7 +13,7 @@ from shadow_atlas import read_atlas, read_vpl_maps
 from small_scenes import box, build
 
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.scene.geometry import carried
+from deferred_ir.scene.geometry import transform_points
 from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
 from deferred_ir.scene.motion import ModelMotion
 from deferred_ir.vpls.incremental import FARTHEST, IncrementalVpls
@@ -43,12 +43,12 @@ def test_what_holds_in_every_frame(steps, budget, seed):
     one, same = IncrementalVpls(48, seed), IncrementalVpls(48, seed)
     poses = np.stack([AROUND.matrix(0.2), UP.matrix(0.2)])
     seen_since = np.zeros(48, bool)  # a model has moved before a slot's VPL since its map was drawn
-    geometry = SCENE.geometry.posed(poses)
+    geometry = SCENE.geometry.pose(poses)
     for step in steps:
         before, poses = geometry, poses.copy()
         if step:
             poses[step[0]] = pose_matrix(3 * np.array(step[1]), 0.6 * np.array(step[2]))
-        geometry = SCENE.geometry.posed(poses)
+        geometry = SCENE.geometry.pose(poses)
         TRACER.follow(replace(SCENE, geometry=geometry))
         version, used, group, position = (a.copy() for a in (one.version, one.used, one._group, one.position))
         vpls = one.update(LIGHT, TRACER, least=least, most=most)
@@ -62,7 +62,7 @@ def test_what_holds_in_every_frame(steps, budget, seed):
         stays = used & one.used & ~drawn
         for number, (now, then) in enumerate(zip(geometry.poses, before.poses, strict=True)):
             own = stays & (group == 1 + number)
-            expected = carried(position[own], now @ np.linalg.inv(then))
+            expected = transform_points(position[own], now @ np.linalg.inv(then))
             np.testing.assert_allclose(one.position[own], expected, atol=1e-12)
         assert (one._lag()[one.used] <= FARTHEST * geometry.diagonal).all()
         where, normal = one.position[vpls.ray], one.normal[vpls.ray]

@@ -7,7 +7,7 @@ I(w) = E_i cos(theta_y) inside a round cone.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -67,8 +67,11 @@ class Spotlight:
         return inside
 
     def at(self, time: float) -> Spotlight:
-        """The spotlight at `time` seconds of its motion."""
-        return self.motion.spotlight(self, time) if self.motion else self
+        """Return the spotlight where it is at `time` seconds of its motion."""
+        if self.motion is None:
+            return self
+        position, look_at = self.motion.move(self.position, self.look_at, time)
+        return replace(self, position=position, look_at=look_at)
 
 
 def one_minus_cos(fov: float) -> float:

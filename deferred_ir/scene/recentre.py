@@ -1,0 +1,79 @@
+"""Moves a scene near the origin and splits its huge triangles, so that 32-bit floats hold it.
+
+The GPU and Embree get every scene this way. Both steps are done in 64 bits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TypeVar
+from weakref import WeakKeyDictionary
+
+from deferred_ir.base.arrays import Vec3
+from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.geometry import Geometry
+from deferred_ir.scene.large_triangles import split_large_triangles
+from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.scene import Scene
+
+View = TypeVar("View", Camera, Spotlight)
+
+_recentred: WeakKeyDictionary[Geometry, Geometry | None] = WeakKeyDictionary()
+"""Results by what they were made from, None where that needs no change: the dictionary must not keep its own keys."""
+
+
+def recentre(scene: Scene) -> Scene:
+    """Return the scene in coordinates about `scene.geometry.centre`, without huge triangles; itself if it is so.
+
+    Camera and light rest where they are.
+    """
+    geometry = recentre_geometry(scene.geometry)
+    if geometry is scene.geometry:
+        return scene
+    x, y, z = scene.geometry.centre
+    by = (-x, -y, -z)
+    return replace(
+        scene,
+        geometry=geometry,
+        camera=translate_view(scene.camera, by),
+        spotlight=translate_view(scene.spotlight, by),
+    )
+
+
+def recentre_geometry(geometry: Geometry) -> Geometry:
+    """Return the geometry in coordinates about its `centre`, without huge triangles; itself if it is so.
+
+    The same geometry gives the same object every time.
+    """
+    if geometry not in _recentred:
+        result = _recentre_rest(geometry) if geometry.rest is geometry else _recentre_pose(geometry)
+        _recentred[geometry] = None if result is geometry else result
+    return _recentred[geometry] or geometry
+
+
+def _recentre_rest(geometry: Geometry) -> Geometry:
+    if not any(geometry.centre):
+        return split_large_triangles(geometry)
+    moving = tuple(
+        replace(model, motion=model.motion.shift_origin(geometry.centre)) for model in geometry.moving if model.motion
+    )
+    medians = geometry.middle - geometry.centre, geometry.spread
+    near = replace(geometry, positions=geometry.positions - geometry.centre, moving=moving, medians=medians)
+    return split_large_triangles(near)
+
+
+def _recentre_pose(geometry: Geometry) -> Geometry:
+    rest = recentre_geometry(geometry.rest)
+    if rest is geometry.rest:
+        return geometry
+    poses = geometry.poses
+    if any(geometry.centre):
+        poses = poses.copy()
+        poses[:, :3, 3] += poses[:, :3, :3] @ geometry.centre - geometry.centre
+    return rest.pose(poses)
+
+
+def translate_view(view: View, by: Vec3) -> View:
+    """Return a camera or spotlight moved by a vector, at rest there."""
+    (x, y, z), (u, v, w), (a, b, c) = view.position, view.look_at, by
+    return replace(view, position=(x + a, y + b, z + c), look_at=(u + a, v + b, w + c), motion=None)

@@ -96,7 +96,7 @@ class Accumulation:
         self._run(self._seed, self._late)
         if self._record and self._parts:
             self._renderer.finish(self._parts)
-            for figures in (self._parts.counters, self._parts.kept):
+            for figures in (self._parts.counters, self._parts.skipped):
                 figures.pop()  # of the passes that came after the frames
             self._parts.frame_ms.append(self._adding_ms)
             self._parts.laps.insert(-1, {LAP: (self._adding_ms, self._adding_ms)})

@@ -12,13 +12,13 @@ from statistics import median
 class Record:
     """What repeated frames took. Times in milliseconds; `laps` holds for each frame label -> (GPU, CPU).
 
-    kept: for each frame the passes that did not run, since what they had written was still right.
+    skipped: for each frame the passes that did not run, since what they had written was still right.
     """
 
     frame_ms: list[float] = field(default_factory=list)
     laps: list[dict[str, tuple[float, float]]] = field(default_factory=list)
     counters: list[dict[str, int]] = field(default_factory=list)
-    kept: list[tuple[str, ...]] = field(default_factory=list)
+    skipped: list[tuple[str, ...]] = field(default_factory=list)
 
     def join(self, parts: Record) -> None:
         """Add one frame that was drawn in parts: times are added up, counters stay those of each part."""
@@ -30,7 +30,7 @@ class Record:
         self.frame_ms.append(sum(parts.frame_ms))
         self.laps.append(laps)
         self.counters += parts.counters
-        self.kept += parts.kept
+        self.skipped += parts.skipped
 
     def passes(self) -> list[dict[str, float | str]]:
         """Name, GPU and CPU median of each pass, in the order in which they ran; 0 in frames that kept its outputs."""
@@ -41,7 +41,7 @@ class Record:
 
     def reused(self) -> list[tuple[str, int, float | None]]:
         """Passes that did not run in all frames: name, in how many not, and their GPU median where they ran."""
-        frames = Counter(name for kept in self.kept for name in kept)
+        frames = Counter(name for skipped in self.skipped for name in skipped)
         ran = {name: [frame for frame in self.laps if name in frame] for name in frames}
         return [(name, n, _median(ran[name], name, 0) if ran[name] else None) for name, n in frames.items()]
 

@@ -188,7 +188,7 @@ class Renderer:
                 record.frame_ms.append((clock.perf_counter() - start) * 1e3)
                 record.laps += timers.collect()
                 record.counters.append(dict(self.executor.counters))
-                record.kept.append(self.executor.kept)
+                record.skipped.append(self.executor.skipped)
 
     def reset(self) -> None:
         """Drop what is kept from frame to frame: the next one starts afresh, and runs every pass."""

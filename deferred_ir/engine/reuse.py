@@ -1,23 +1,24 @@
-"""Which passes a frame can leave as they are: those that would write what they wrote last.
+"""Decides which passes a frame can skip: a pass is skipped while its outputs hold what it would write.
 
-A pass's outputs are made of its parameters, its inputs and the parts of the frame that it names (`Pass.depends`).
-Inputs are told by the version that each resource has: a new one whenever something is written into it.
+They follow from its parameters, its inputs and the parts of the frame that it names (`Pass.depends`). Inputs are
+compared by the version of each resource, which is a new one whenever something is written into it.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.pass_io import Io, Resource
+from deferred_ir.frame.pass_io import Io, single_resources
 from deferred_ir.graph.graph import Step
 
 
 @dataclass(frozen=True)
 class _Run:
-    made_of: tuple[Any, ...]
+    causes: tuple[Any, ...]
     outputs: list[int]
     figures: Counter[str]
 
@@ -29,28 +30,28 @@ class Runs:
         self._runs: dict[str, _Run] = {}
 
     def figures(self, step: Step, io: Io, frame: Frame) -> Counter[str] | None:
-        """The figures that still hold, if the step would write what its outputs hold already; else None."""
+        """Return the figures of its last run, which still hold, if the step can be skipped; else None."""
         run = self._runs.get(step.name)
-        if run and run.outputs == _versions(io, step.outputs) and run.made_of == _made_of(step, io, frame):
+        if run and run.outputs == _versions(io, step.outputs) and run.causes == _causes(step, io, frame):
             return run.figures
         return None
 
     def forget(self, step: Step) -> None:
-        """Its outputs are being written."""
+        """Note that its outputs are being written."""
         self._runs.pop(step.name, None)
 
     def remember(self, step: Step, io: Io, frame: Frame) -> None:
-        """Its outputs are written."""
+        """Note that its outputs are written."""
         if not io.again:
-            self._runs[step.name] = _Run(_made_of(step, io, frame), _versions(io, step.outputs), Counter(io.figures))
+            self._runs[step.name] = _Run(_causes(step, io, frame), _versions(io, step.outputs), Counter(io.figures))
 
     def clear(self) -> None:
-        """Every step is to run."""
+        """Have every step run."""
         self._runs.clear()
 
 
-def _made_of(step: Step, io: Io, frame: Frame) -> tuple[Any, ...]:
-    """What the outputs of a step follow from; two are equal only if the outputs are."""
+def _causes(step: Step, io: Io, frame: Frame) -> tuple[Any, ...]:
+    """Return what the outputs of a step follow from: if two runs' are equal, so are the outputs."""
     return (
         type(step.work),
         step.work.params,
@@ -62,8 +63,5 @@ def _made_of(step: Step, io: Io, frame: Frame) -> tuple[Any, ...]:
     )
 
 
-def _versions(io: Io, ports: Any) -> list[int]:
-    resources: list[Resource | None] = [io[port] for port in ports]
-    return [
-        single.version for found in resources if found for single in (found if isinstance(found, list) else [found])
-    ]
+def _versions(io: Io, ports: Iterable[str]) -> list[int]:
+    return [single.version for port in ports for single in single_resources(io[port])]

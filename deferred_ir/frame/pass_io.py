@@ -1,9 +1,9 @@
-"""What a pass sees while it executes: its ports, its programs, and a base for passes that are one fullscreen shader."""
+"""What a pass works with while it executes: the resources of its ports, its programs, its state, and its counters."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 from deferred_ir.base.errors import DeviceError, ShaderError
@@ -57,6 +57,9 @@ class Io:
                 self.metas[name] = written[source].meta
         for output in step.outputs.values():
             self.defines |= output.defines
+        images = [name for name, output in step.outputs.items() if output.image]
+        self._images = {name: i for i, name in enumerate(images)}
+        self.defines |= {f"IMAGE_{name.upper()}": i for name, i in self._images.items()}
         drawn = [name for name, output in step.outputs.items() if output.attach and _colour(ports[name])]
         self.defines |= {f"TARGET_{name.upper()}": i for i, name in enumerate(drawn)}
 
@@ -80,11 +83,11 @@ class Io:
         return self._framebuffer
 
     def attach(self, framebuffer: Framebuffer) -> None:
-        """Give the pass its render target."""
+        """Set the pass's render target."""
         self._framebuffer = framebuffer
 
     def begin(self) -> None:
-        """Before a run: bind the framebuffer and all sampled inputs; nothing is published yet."""
+        """Prepare a run: bind the framebuffer, all sampled inputs and images, and publish nothing yet."""
         self.counters.clear()
         self.figures.clear()
         self.again = False
@@ -93,9 +96,16 @@ class Io:
         for name, unit in self._units.items():
             port = self.step.work.inputs[name]
             self[name].bind(unit, self.gpu.sampler(port.linear, port.compare))
+        for name, unit in self._images.items():
+            self[name].bind_image(unit)
+
+    def end(self) -> None:
+        """Finish a run: let others see what shaders stored into images."""
+        if self._images:
+            self.gpu.barrier()
 
     def program(self, *files: str, defines: Mapping[str, int | float] = NO_DEFINES) -> Program:
-        """The program of these shader files, one a stage, with the defines of this pass's ports and `defines`."""
+        """Return the program of these shader files, one a stage; they know the defines of the ports and `defines`."""
         key = (*files, *defines.items())
         if key not in self._programs:
             folder = self.step.work.shader_folder
@@ -141,6 +151,11 @@ class Io:
 def new_state(work: Pass) -> Any:
     """Return the state that a pass starts with, None if it declares none."""
     return None if work.State is None else work.State()
+
+
+def single_resources(resource: Resource | None) -> Sequence[GpuTexture | GpuBuffer]:
+    """Return the textures and buffers of a port, of which `Texture.copies` makes several."""
+    return resource if isinstance(resource, list) else [resource] if resource else []
 
 
 def _colour(resource: Resource | None) -> bool:

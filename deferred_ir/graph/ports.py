@@ -74,7 +74,8 @@ class Input:
 class Output:
     """A port that writes. `defines` tell the readers' shaders what they must know of the writer (layout, encoding).
 
-    `attach` False: a texture that shaders store into wherever they like, instead of a target of the pass's framebuffer.
+    `attach` False: a texture that is no target of the pass's framebuffer. `image`: shaders store into it wherever they
+    like; it is bound to the image unit `IMAGE_<PORT>` while the pass runs.
     `spare`: the pass can do without it, and does where nothing reads it; its shader asks for `TARGET_<PORT>`.
     `transient`: a texture that each frame writes whole and the next does not read, so that once its last reader is done
     another output of the same description may use it.
@@ -85,6 +86,7 @@ class Output:
     description: Description
     defines: Mapping[str, int | float] = field(default_factory=dict)
     attach: bool = True
+    image: bool = False
     spare: bool = False
     transient: bool = False
     meta: Any = None

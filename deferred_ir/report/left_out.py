@@ -47,7 +47,7 @@ def of_scene(scene: Scene) -> list[LeftOut]:
 
 def of_frames(renderer: Renderer, plan: Plan, record: Record) -> list[LeftOut]:
     """What the frames that `record` tells of did without, as the device has it after the last of them."""
-    executor, frames, last = renderer.executor, len(record.kept), record.counters[-1]
+    executor, frames, last = renderer.executor, len(record.skipped), record.counters[-1]
     found = [
         LeftOut(name, f"in {n} of {frames} frames nothing that it is made of changed", ms)
         for name, n, ms in record.reused()
@@ -69,8 +69,8 @@ def of_frames(renderer: Renderer, plan: Plan, record: Record) -> list[LeftOut]:
                 why = f"{made.layers} of {described.layers} layers are enough for the lights that live"
                 spared = made.nbytes // made.layers * (described.layers - made.layers)
                 found.append(LeftOut(f"{step.name}.{port}", why, bytes=spared))
-    nbytes = executor.nbytes()
-    for source, home in executor.tenants.items():
+    nbytes = executor.allocation.nbytes()
+    for source, home in executor.allocation.aliases.items():
         why = f"it has the texture of {'.'.join(home)}, which nothing reads any more"
         found.append(LeftOut(".".join(source), why, bytes=nbytes[".".join(home)]))
     return found
@@ -86,7 +86,7 @@ def of_passes(renderer: Renderer, scene: Scene, plan: Plan, *, vpls: int | None 
     if plan.left_out:
         with suppress(DeviceError, GraphError):
             ms = _timed(renderer, scene, plan, vpls=vpls, seed=seed)
-            nbytes = renderer.executor.nbytes()
+            nbytes = renderer.executor.allocation.nbytes()
     return [LeftOut(name, why, ms.get(name), nbytes.get(name)) for name, why in plan.left_out.items()]
 
 

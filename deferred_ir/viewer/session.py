@@ -62,7 +62,7 @@ class Session:
         self.accumulation: Accumulation | None = None
         self.frame_ms: deque[float] = deque(maxlen=FRAMES_KEPT)
         self.laps: dict[str, tuple[float, float]] = {}
-        self.kept: frozenset[str] = frozenset()
+        self.skipped: frozenset[str] = frozenset()
         self.counters: dict[str, int] = {}
         self._noise = Noise()
         self._path: Path | None = None
@@ -232,10 +232,10 @@ class Session:
         record = Record()
         self.renderer.draw(self.shown, self.plan, seed=self.seed, record=record)
         self.renderer.finish(record)
-        kept = frozenset(self.renderer.executor.kept)
-        if len(kept) == len(self.plan.steps):
+        skipped = frozenset(self.renderer.executor.skipped)
+        if len(skipped) == len(self.plan.steps):
             return False
-        self.kept = kept
+        self.skipped = skipped
         self._keep(record)
         return True
 

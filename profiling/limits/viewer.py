@@ -61,7 +61,8 @@ def measure(viewer: Viewer, frames: int) -> dict[str, list[float]]:
         if number < WARM:
             continue
         laps = {
-            step.name: 0.0 if step.name in session.kept else session.laps[step.name][0] for step in session.plan.steps
+            step.name: 0.0 if step.name in session.skipped else session.laps[step.name][0]
+            for step in session.plan.steps
         }
         for name, milliseconds in laps.items():
             parts[name].append(milliseconds)

@@ -44,7 +44,7 @@ def drawn(one, scene, **options):
     """Which passes ran."""
     plan = one.plan(scene)
     one.draw(scene, plan, **options)
-    return {step.name for step in plan.steps} - set(one.executor.kept)
+    return {step.name for step in plan.steps} - set(one.executor.skipped)
 
 
 def settled(one, scene=ROOM):

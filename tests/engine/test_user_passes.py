@@ -194,6 +194,97 @@ def test_a_pass_may_publish_figures_which_start_at_zero_each_frame(draw):
     assert one.executor.counters["things"] == 5
 
 
+def test_an_image_that_shaders_store_into_is_bound_and_seen_by_readers(draw, tmp_path):
+    class Mirror(FullscreenPass):
+        fragment = "mirror.frag"
+        shader_folder = tmp_path
+        inputs = {"image": Input("image", format="rgba32f")}  # noqa: RUF012
+
+        def outputs(self, inputs):
+            return {
+                "target": Output("a target", Texture("rgba8")),
+                "out": Output("mirrored", Texture("rgba32f"), attach=False, image=True),
+            }
+
+    (tmp_path / "mirror.frag").write_text("""
+        layout(binding = UNIT_IMAGE) uniform sampler2D image;
+        layout(binding = IMAGE_OUT, rgba32f) uniform writeonly image2D stored;
+        void main() {
+            ivec2 pixel = ivec2(gl_FragCoord.xy);
+            imageStore(stored, ivec2(imageSize(stored).x - 1 - pixel.x, pixel.y), texelFetch(image, pixel, 0));
+        }
+    """)
+    _, images = draw(kind=Mirror)
+    np.testing.assert_array_equal(images["own"], images["radiance"][:, ::-1])
+
+
+@dataclass
+class Count:
+    """How many frames a pass has run in."""
+
+    frames: int = 0
+
+
+class Counting(Pass):
+    """A pass that counts its frames."""
+
+    State = Count
+    format = "rgba8"
+
+    def outputs(self, inputs):
+        return {"out": Output("", Texture(self.format))}
+
+    def execute(self, frame, io):
+        io.state.frames += 1
+
+
+def test_state_stays_from_frame_to_frame_until_scene_or_outputs_are_new(draw):
+    kind = type("Counting", (Counting,), {})
+    one, _ = draw(graph=ALONE, kind=kind, vpls=None)
+    assert one.executor.state("invert") == Count(1)
+    scene = room()
+
+    def frames(plan=None):
+        one.draw(scene, plan or one.plan(scene))
+        return one.executor.state("invert").frames
+
+    assert frames() == 1  # of another scene
+    assert [frames(), frames()] == [2, 3]
+    one.reset()
+    assert [frames(), frames()] == [1, 2]
+    one.configure(size=(20, 10))
+    assert [frames(), frames()] == [1, 2]
+    kind.format = "rgba16f"
+    one.configure(size=(20, 10), set={})
+    assert [frames(), frames()] == [1, 2]
+
+
+def test_what_a_writer_says_of_its_output_reaches_its_readers_with_its_type(draw, tmp_path):
+    class Writer(Pass):
+        def outputs(self, inputs):
+            return {"out": Output("out", Texture("rgba32f"), meta=Count(7))}
+
+        def execute(self, frame, io):
+            io.framebuffer.clear_color()
+
+    class Reader(Pass):
+        inputs = {"image": Input("image")}  # noqa: RUF012
+
+        def outputs(self, inputs):
+            return {"out": Output("out", Texture("rgba8"))}
+
+        def execute(self, frame, io):
+            assert io.meta("image", Count).frames == 7
+            with pytest.raises(TypeError, match=r"^invert\.image: carries Count, and Params is wanted$"):
+                io.meta("image", Params)
+
+    (tmp_path / "g.toml").write_text(
+        '[outputs]\nown = "invert.out"\n[passes.writer]\n[passes.invert]\ninputs = { image = "writer.out" }\n'
+    )
+    with Renderer(SIZE, tmp_path / "g.toml", "software", passes={"writer": Writer, "invert": Reader}) as one:
+        one.draw(room(), one.plan(room()))
+
+
 def test_a_port_that_was_not_declared_is_an_error_with_those_that_were(draw):
     class Careless(Pass):
         inputs = {"image": Input("image")}  # noqa: RUF012

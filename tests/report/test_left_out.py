@@ -78,7 +78,7 @@ def test_frames_of_a_mean_are_counted_without_what_shows_it(renderer):
     for _ in range(3):
         mean.draw()
     mean.show()
-    assert record.kept == [(), ("gbuffer",), ("gbuffer",)]
+    assert record.skipped == [(), ("gbuffer",), ("gbuffer",)]
     assert record.reused()[0][:2] == ("gbuffer", 2)
 
 

@@ -25,12 +25,12 @@ def test_a_parameter_rebuilds_nothing_and_runs_only_what_reads_it(viewer):
     viewer.frame()
     session.adjust("tonemap.exposure", 1.0)
     viewer.frame()
-    kept, compiled = dict(executor._resources), executor.library.compiled
+    kept, compiled = dict(executor.allocation._resources), executor.library.compiled
     session.laps.clear()
     for stops in (1.5, 2.0, -3.0):
         session.adjust("tonemap.exposure", stops)
         viewer.frame()
-    assert dict(executor._resources) == kept
+    assert dict(executor.allocation._resources) == kept
     assert executor.library.compiled == compiled
     assert set(session.laps) == {"tonemap"}
     assert np.array_equal(picture(viewer), rendered(cornell(), set={**FEW, "tonemap.exposure": -3.0}))

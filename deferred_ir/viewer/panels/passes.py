@@ -60,12 +60,12 @@ class PassesPanel:
             imgui.text(text)
 
     def _row(self, step: Step) -> None:
-        imgui, laps, kept = self._imgui, self._session.laps.get(step.name), step.name in self._session.kept
+        imgui, laps, skipped = self._imgui, self._session.laps.get(step.name), step.name in self._session.skipped
         times = (f"{laps[0]:.2f}", f"{laps[1]:.2f}") if laps else ("-", "-")
-        if kept:
+        if skipped:
             imgui.push_style_color(imgui.Col_.text, imgui.get_style_color_vec4(imgui.Col_.text_disabled))
-        self._line(f"{step.name}: kept" if kept else step.name, times)
-        if kept:
+        self._line(f"{step.name}: kept" if skipped else step.name, times)
+        if skipped:
             imgui.pop_style_color()
             imgui.set_item_tooltip(
                 "It did not run: nothing that it is made of had changed. The times are of its last run."

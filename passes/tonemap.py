@@ -23,7 +23,11 @@ class Params:
 
     operator: Operator = param("neutral", doc="Tone curve; none clips.")
     exposure: float | Literal["auto"] = param(
-        "auto", lo=-64.0, hi=64.0, doc="Stops; auto brings the mean luminance of lit surfaces to middle grey."
+        "auto",
+        lo=-64.0,
+        hi=64.0,
+        role="exposure",
+        doc="Stops; auto brings the mean luminance of lit surfaces to middle grey.",
     )
 
 

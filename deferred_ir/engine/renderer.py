@@ -16,6 +16,7 @@ from deferred_ir.base.errors import GraphError, SettingError
 from deferred_ir.engine.accumulation import Accumulation
 from deferred_ir.engine.executor import Executor
 from deferred_ir.engine.record import Record
+from deferred_ir.engine.settings import set_vpls
 from deferred_ir.frame.facts import collect_facts
 from deferred_ir.frame.frame import PARTS, Frame
 from deferred_ir.frame.scene_buffers import SceneBuffers
@@ -67,7 +68,7 @@ class Renderer:
         self._keep_all = keep_all
         self._graphs: dict[int | None, Graph] = {}
         self._plans: dict[Any, Plan] = {}
-        self.graph(None)  # a fault in the graph shows before a context is made
+        self.graph()  # a fault in the graph shows before a context is made
         self.gpu = Gpu(device, window)
         if max(size) > self.gpu.max_size:
             self.gpu.close()
@@ -95,7 +96,7 @@ class Renderer:
         before = {name: getattr(self, name) for name in names}
         name = self._graph_name if graph is None else graph
         settings = self._set if set is None else dict(set)
-        own = self.graph(None)
+        own = self.graph()
         if graph is not None or set is not None:
             own = file.load_graph(name, settings, self._passes)
         if size is not None:
@@ -107,7 +108,7 @@ class Renderer:
     def graph(self, vpls: int | None = None) -> Graph:
         """The graph with this number of VPLs, None for its own."""
         if vpls not in self._graphs:
-            count = {} if vpls is None else {"vpl.count": vpls}
+            count = {} if vpls is None else set_vpls(self.graph(), vpls)
             self._graphs[vpls] = file.load_graph(self._graph_name, self._set | count, self._passes)
         return self._graphs[vpls]
 

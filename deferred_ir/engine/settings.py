@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from deferred_ir.base.errors import SettingError
+from deferred_ir.base.errors import GraphError, SettingError
 from deferred_ir.base.image_size import parse_size
+from deferred_ir.graph.file import load_graph
+from deferred_ir.graph.graph import Graph
 from deferred_ir.graph.params import read_value
+from deferred_ir.graph.roles import find_parameters
 from deferred_ir.scene.scene import RenderDefaults, Scene
 
+VPLS = "vpls"
+"""Role of the parameters that are the number of VPLs."""
 DEFAULT_GRAPH = "deferred"
 DEFAULT_SIZE = (512, 512)
-COUNT = "vpl.count"
-"""What --vpls and [render] vpls set."""
 
 
 def choose_graph(name: str | None, defaults: RenderDefaults) -> str:
@@ -36,17 +40,32 @@ def choose_size(text: str | None, defaults: RenderDefaults) -> tuple[int, int]:
     return size
 
 
-def choose_settings(defaults: RenderDefaults, settings: Mapping[str, Any], vpls: int | None) -> dict[str, Any]:
-    """Merge {"pass.param": value}: --vpls over --set over the scene file's [render] table."""
-    if vpls is not None and settings.get(COUNT, vpls) != vpls:
-        raise SettingError(f"--vpls {vpls} and --set {COUNT}={settings[COUNT]}: contradict each other; give one")
+def choose_settings(
+    graph: str | Path, defaults: RenderDefaults, settings: Mapping[str, Any], vpls: int | None
+) -> dict[str, Any]:
+    """Merge {"pass.param": value}: --vpls over --set over the scene file's [render] table.
+
+    graph: name or file; its parameters with the role `vpls` are what --vpls and [render] vpls set.
+    """
     chosen = dict(defaults.set)
     if defaults.vpls is not None:
-        chosen[COUNT] = defaults.vpls
+        chosen |= set_vpls(load_graph(graph), defaults.vpls)
     chosen |= settings
     if vpls is not None:
-        chosen[COUNT] = vpls
+        counts = set_vpls(load_graph(graph), vpls)
+        for key in counts.keys() & settings.keys():
+            if settings[key] != vpls:
+                raise SettingError(f"--vpls {vpls} and --set {key}={settings[key]}: contradict each other; give one")
+        chosen |= counts
     return chosen
+
+
+def set_vpls(graph: Graph, vpls: int) -> dict[str, int]:
+    """Return {"pass.param": vpls} for each parameter that is a number of VPLs. Raises GraphError if there is none."""
+    counts = dict.fromkeys(find_parameters(graph, VPLS), vpls)
+    if not counts:
+        raise GraphError(f'{graph.origin}: no pass has a number of VPLs to set, a parameter with role="{VPLS}"')
+    return counts
 
 
 def parse_settings(pairs: Sequence[str]) -> dict[str, Any]:

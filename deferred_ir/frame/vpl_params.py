@@ -28,7 +28,9 @@ room and a cathedral, and flat about there (half or twice of it costs a tenth to
 class VplParams:
     """Parameters of VPLs, wherever they come from."""
 
-    count: int = param(64, lo=0, hi=65536, doc="Rays that leave the spotlight; each that lands makes a VPL.")
+    count: int = param(
+        64, lo=0, hi=65536, role="vpls", doc="Rays that leave the spotlight; each that lands makes a VPL."
+    )
     fov: float = param(150.0, lo=1.0, hi=179.9, doc="Full opening angle of the cone a VPL shines into, degrees.")
     clamp: float | Literal["auto"] = param(
         0.02,
@@ -58,4 +60,4 @@ class CastParams(VplParams):
     """Parameters of VPLs that are cast anew for each image, in a render and in a reference."""
 
     pattern: Pattern = param("sobol", doc="Sample pattern on the disc of directions.")
-    bounces: int = param(1, lo=1, hi=64, doc="Diffuse bounces; each beyond the first adds VPLs.")
+    bounces: int = param(1, lo=1, hi=64, role="bounces", doc="Diffuse bounces; each beyond the first adds VPLs.")

@@ -16,14 +16,21 @@ from deferred_ir.base.errors import did_you_mean, shown
 
 
 def param(
-    default: Any, *, doc: str, lo: float | None = None, hi: float | None = None, formerly: str | None = None
+    default: Any,
+    *,
+    doc: str,
+    lo: float | None = None,
+    hi: float | None = None,
+    formerly: str | None = None,
+    role: str | None = None,
 ) -> Any:
-    """A dataclass field that is a parameter: its default, its inclusive range and one sentence about it.
+    """Declare a dataclass field that is a parameter: its default, its inclusive range and one sentence about it.
 
-    formerly: its name when it was another pass's, `old_pass.old_param`, which is still accepted.
+    formerly: its name when it was another pass's, `old_pass.old_param`, which is still accepted. role: what it is for
+    those who do not know the pass (see graph/roles.py): "vpls" is what --vpls sets.
     """
-    moved = {} if formerly is None else {"formerly": formerly}
-    return field(default=default, metadata={"doc": doc, "lo": lo, "hi": hi, **moved})
+    more = {name: value for name, value in (("formerly", formerly), ("role", role)) if value is not None}
+    return field(default=default, metadata={"doc": doc, "lo": lo, "hi": hi, **more})
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,10 @@ from deferred_ir.base.arrays import Array, Bools
 from deferred_ir.base.errors import OutputError, SettingError, did_you_mean
 from deferred_ir.base.files import check_folder, write_json, write_whole
 from deferred_ir.base.progress import Progress
-from deferred_ir.graph.file import load_graph
+from deferred_ir.frame.vpl_params import CastParams
+from deferred_ir.graph.params import parse
 from deferred_ir.rays.tracer import Tracer
+from deferred_ir.sampling.patterns import warn_unbalanced
 from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.path_tracer import PathTracer
@@ -136,15 +138,19 @@ def _check(
         raise SettingError(f"set {min(settings)}: belongs to VPLs, and paths have none; give --vpls N, or leave it out")
 
 
-def vpl_params(settings: Mapping[str, Any]) -> Any:
-    """The parameters of VPLs as a render has them, with `settings` on top; cones may open to 180 degrees here.
+def vpl_params(settings: Mapping[str, Any]) -> CastParams:
+    """Return the parameters of VPLs with the defaults of a render and `settings` on top; cones may open to 180 degrees.
 
     Shadow maps end a little short of the hemisphere, rays do not.
     """
     fov = settings.get("vpl.fov")
     whole = isinstance(fov, int | float) and fov == 180
     rest = {name: value for name, value in settings.items() if not (whole and name == "vpl.fov")}
-    params: Any = load_graph("deferred", rest).nodes["vpl"].work.params
+    faults: list[str] = []
+    params: CastParams = parse(CastParams, {name.partition(".")[2]: rest[name] for name in rest}, "vpl", faults)
+    if faults:
+        raise SettingError("; ".join(faults))
+    warn_unbalanced(params.pattern, params.count)
     return replace(params, fov=180.0) if whole else params
 
 

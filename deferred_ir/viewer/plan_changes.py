@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from deferred_ir.graph.graph import Plan, Step
+from deferred_ir.graph.roles import find_parameter
 
 
 def changed(old: Plan, new: Plan) -> set[str]:
@@ -25,12 +26,13 @@ def _identity(step: Step) -> tuple[Any, ...]:
 
 def exposed(plan: Plan, stops: float) -> Plan:
     """`plan` with `stops` wherever a pass's exposure is automatic; itself where none is."""
-    steps = [
-        replace(step, work=type(step.work)(replace(step.work.params, exposure=stops))) if _automatic(step) else step
-        for step in plan.steps
-    ]
-    return replace(plan, steps=tuple(steps)) if any(map(_automatic, plan.steps)) else plan
+    steps = tuple(_expose(step, stops) for step in plan.steps)
+    return plan if steps == plan.steps else replace(plan, steps=steps)
 
 
-def _automatic(step: Step) -> bool:
-    return getattr(step.work.params, "exposure", None) == "auto"
+def _expose(step: Step, stops: float) -> Step:
+    """Return `step` with an exposure of `stops` if its own is automatic, else itself."""
+    name = find_parameter(step.work, "exposure")
+    if name is None or getattr(step.work.params, name) != "auto":
+        return step
+    return replace(step, work=type(step.work)(replace(step.work.params, **{name: stops})))

@@ -21,6 +21,7 @@ from deferred_ir.engine.renderer import IMAGES, Renderer
 from deferred_ir.engine.settings import choose_settings
 from deferred_ir.gl.devices import Loader
 from deferred_ir.graph.graph import Plan
+from deferred_ir.graph.roles import find_parameters
 from deferred_ir.loading.load import load
 from deferred_ir.output.exposure import automatic_stops
 from deferred_ir.output.image import Image
@@ -119,7 +120,8 @@ class Session:
         try:
             scene = load(name)
             self.scene = scene
-            self._configure(scene.render.graph or self.graph, choose_settings(scene.render, {}, None))
+            graph = scene.render.graph or self.graph
+            self._configure(graph, choose_settings(graph, scene.render, {}, None))
         except Error as error:
             self.scene, self.error = before, str(error)
             return
@@ -303,8 +305,7 @@ class Session:
     @property
     def bounces(self) -> int:
         """Bounces of indirect light that the graph makes."""
-        counts = [getattr(step.work.params, "bounces", 1) for step in self.plan.steps]
-        return max(counts)
+        return max(find_parameters(self.renderer.graph(), "bounces").values(), default=1)
 
     def choose_motions(self) -> tuple[Camera, Spotlight]:
         """Return eye and light as a scene file should have them: with their motions if they are where those begin."""

@@ -14,7 +14,6 @@ from deferred_ir.base.errors import GraphError, SettingError
 from deferred_ir.base.progress import progress_bar
 from deferred_ir.engine.record import Record
 from deferred_ir.engine.renderer import IMAGES, Renderer
-from deferred_ir.engine.settings import choose_settings
 from deferred_ir.gl.context import Gpu
 from deferred_ir.graph.file import graph_hash, load_graph
 from deferred_ir.graph.graph import Plan
@@ -88,7 +87,7 @@ class Sweep:
     @property
     def settings(self) -> Mapping[str, Any]:
         """Parameters of passes from the scene file."""
-        return choose_settings(self.scene.render, {}, None)
+        return self.scene.render.set
 
     def key(self, graph: str, vpls: int, seed: int) -> Key:
         """What the point depends on."""

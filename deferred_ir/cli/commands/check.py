@@ -130,7 +130,7 @@ def _choose_options(
     arguments: argparse.Namespace, settings: Mapping[str, Any]
 ) -> Iterator[tuple[Scene, visibility.Options]]:
     """Yield each scene with what to measure in it."""
-    from deferred_ir.engine.settings import choose_seed, choose_settings, choose_size
+    from deferred_ir.engine.settings import DEFAULT_GRAPH, choose_seed, choose_settings, choose_size
     from deferred_ir.profiling.checks import visibility
     from deferred_ir.scene.scene import RenderDefaults
 
@@ -146,7 +146,7 @@ def _choose_options(
                 vpl_sizes=sizes,
                 seed=choose_seed(arguments.seed, scene.render),
                 device=arguments.device,
-                settings=choose_settings(_drop_unknown(scene.render), settings, arguments.vpls),
+                settings=choose_settings(DEFAULT_GRAPH, _drop_unknown(scene.render), settings, arguments.vpls),
             ),
         )
 

@@ -35,7 +35,8 @@ def run(arguments: argparse.Namespace) -> int:
 
         scene = load(arguments.scene)
         defaults, facts = scene.render, collect_facts(scene)
-    graph = load_graph(arguments.graph, choose_settings(defaults, parse_settings(arguments.set), arguments.vpls))
+    settings = choose_settings(arguments.graph, defaults, parse_settings(arguments.set), arguments.vpls)
+    graph = load_graph(arguments.graph, settings)
     plan = compile(graph, list(graph.outputs), facts)
     print(plan_text.dot(graph, plan) if arguments.dot else plan_text.summary(plan, scene))
     return 0

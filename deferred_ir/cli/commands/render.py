@@ -95,11 +95,12 @@ def _open_renderer(arguments: argparse.Namespace, scene: Scene, settings: Mappin
     from deferred_ir.engine.renderer import Renderer
     from deferred_ir.engine.settings import choose_graph, choose_settings, choose_size
 
+    graph = choose_graph(arguments.graph, scene.render)
     return Renderer(
         choose_size(arguments.size, scene.render),
-        choose_graph(arguments.graph, scene.render),
+        graph,
         arguments.device,
-        set=choose_settings(scene.render, settings, arguments.vpls),
+        set=choose_settings(graph, scene.render, settings, arguments.vpls),
         reuse=arguments.reuse,
         keep_all=arguments.keep_all,
     )

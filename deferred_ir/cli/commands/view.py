@@ -58,12 +58,13 @@ def run(arguments: argparse.Namespace) -> int:
     window = Window("deferred-ir", (width + WIDTH, height))
     try:
         window.resize((width + round(WIDTH * window.scale), height))
+        graph = choose_graph(arguments.graph, scene.render)
         session = Session(
             scene,
             (width, height),
             window,
-            graph=choose_graph(arguments.graph, scene.render),
-            settings=choose_settings(scene.render, settings, arguments.vpls),
+            graph=graph,
+            settings=choose_settings(graph, scene.render, settings, arguments.vpls),
             seed=choose_seed(arguments.seed, scene.render),
         )
         viewer = Viewer(window, session)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from deferred_ir.base.arrays import Array
-from deferred_ir.loading.models import homed
+from deferred_ir.loading.models import move_uvs_home
 from deferred_ir.profiling.checks.change_triangles import with_geometry
 from deferred_ir.scene.scene import Scene, Texture
 
@@ -70,7 +70,7 @@ def checkered(scene: Scene, shift: float = 0.0) -> Scene:
 
 def _with_texture(scene: Scene, pixels: Array, shift: float) -> Scene:
     plain = with_albedo(scene, 1.0)
-    uvs = homed((plain.geometry.positions - plain.geometry.bounds[0])[:, :2] / plain.geometry.diagonal + shift)
+    uvs = move_uvs_home((plain.geometry.positions - plain.geometry.bounds[0])[:, :2] / plain.geometry.diagonal + shift)
     paper = replace(
         plain,
         materials=tuple(replace(material, texture=0) for material in plain.materials),

@@ -22,7 +22,8 @@ from deferred_ir.base.errors import Error, GraphError, SceneError
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import load_graph
-from deferred_ir.loading import gltf_checks, models
+from deferred_ir.loading import models
+from deferred_ir.loading.formats import gltf_checks
 from deferred_ir.loading.textures import decode_texture
 
 MENDED = {

@@ -16,9 +16,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import SceneError, shown
-from deferred_ir.loading import gltf_checks
 from deferred_ir.loading.asset_paths import Assets
+from deferred_ir.loading.formats import gltf_checks
+from deferred_ir.loading.formats.model_format import ModelFormat, Reflectance, choose_plain_albedo
+from deferred_ir.loading.model_data import check_albedo
 
 TRIANGLES, STRIP, FLOAT, REPEAT = 4, 5, 5126, 10497
 HONOURED = {"EXT_texture_webp", "KHR_mesh_quantization"}
@@ -48,6 +53,32 @@ class GltfFile:
     assets: Assets
     materials: tuple[BaseColor, ...]
     notes: tuple[str, ...]
+
+
+class GltfFormat(ModelFormat):
+    """A glTF file. Base colours and vertex colours are linear, and textures multiply them."""
+
+    image_replaces_albedo = False
+
+    def __init__(self, path: Path, data: bytes, root: Path | None) -> None:
+        file = read(path, data, root)
+        super().__init__(path, file.text, "gltf", file.assets)
+        self.notes += file.notes
+        self._materials = file.materials
+
+    def read_reflectance(self, material: Any, colored: bool) -> Reflectance:
+        """Return the base colour of the file's material, whose index is the name of trimesh's."""
+        if material is None:
+            return Reflectance("default", choose_plain_albedo(colored))
+        base = self._materials[int(material.name)]
+        where, image = f"{self.path}: material {base.name}", material.baseColorTexture
+        if base.image is not None and image is None:
+            raise SceneError(f"{where}: image {base.image} is missing or not readable; put it next to the model")
+        return Reflectance(base.name, check_albedo(base.factor, where, self.notes), image, base.image or "")
+
+    def decode_colors(self, values: Array) -> Array:
+        """Return stored colours, which are linear, cut to 1."""
+        return np.clip(values, 0, 1)
 
 
 def read(path: Path, data: bytes, root: Path | None = None) -> GltfFile:

@@ -9,9 +9,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading.asset_paths import Assets, without_options
+from deferred_ir.loading.formats.model_format import ModelFormat, Reflectance, choose_plain_albedo
+from deferred_ir.loading.model_data import check_albedo
 
 MATERIALS = "materials.mtl"
 """Name under which all materials of a model are handed to trimesh."""
@@ -34,6 +37,32 @@ class ObjFile:
     assets: Assets
     materials: dict[str, MtlMaterial]
     notes: tuple[str, ...]
+
+
+class ObjFormat(ModelFormat):
+    """An OBJ file with its MTL files. An image (map_Kd) replaces the colour (Kd)."""
+
+    def __init__(self, path: Path, data: bytes, root: Path | None) -> None:
+        file = read(path, data, root)
+        super().__init__(path, file.text, "obj", file.assets)
+        self.notes += file.notes
+        self._materials = file.materials
+
+    def read_reflectance(self, material: Any, colored: bool) -> Reflectance:
+        """Return Kd, unrounded, and map_Kd of the file's material of that name."""
+        plain = choose_plain_albedo(colored)
+        if material is None:
+            return Reflectance("default", plain)
+        image = self.find_image(material)
+        fills_in = image is None and getattr(material, "image", None) is not None
+        known = MtlMaterial() if fills_in else self._materials.get(material.name, MtlMaterial())
+        self.require_image(material, image, known.image)
+        if material.name in self._materials and not known.kd and image is None:
+            self.notes.append(f"{self.path.name}: material {material.name} has no Kd that can be read; it is grey")
+        if known.emits:
+            self.notes.append(f"{self.path.name}: emission (Ke) is ignored")
+        albedo = check_albedo(known.kd, self.locate(material), self.notes) if known.kd else plain
+        return Reflectance(material.name, albedo, image, known.image or f"texture of {material.name}")
 
 
 def read(path: Path, data: bytes, root: Path | None = None) -> ObjFile:

@@ -1,0 +1,1 @@
+"""Formats of model files, one a file: what each needs besides trimesh."""

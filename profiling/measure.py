@@ -6,7 +6,7 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import TypeVar
 
 from deferred_ir.base.progress import track
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.graph.graph import Plan
 from deferred_ir.scene.scene import Scene
@@ -33,16 +33,16 @@ def time_frames(
     *,
     label: str = "",
     new_seeds: bool = False,
-) -> dict[Name, Record]:
+) -> dict[Name, Measurement]:
     """Draw `turns` frames with each renderer, in turns. Returns their measurements.
 
     A first frame of each is not measured: it compiles and allocates. new_seeds: each turn has a seed of its own.
     """
-    measurements = {name: Record() for name in renderers}
+    measurements = {name: Measurement() for name in renderers}
     for name, renderer in renderers.items():
         renderer.draw(scene, plans[name])
     for turn, name in take_turns(list(renderers), turns, label):
-        renderers[name].draw(scene, plans[name], seed=turn if new_seeds else 0, record=measurements[name])
+        renderers[name].draw(scene, plans[name], seed=turn if new_seeds else 0, measurement=measurements[name])
     for name, renderer in renderers.items():
         renderer.finish(measurements[name])
     return measurements

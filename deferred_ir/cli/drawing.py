@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from deferred_ir.base.progress import ProgressBar, progress_bar
 from deferred_ir.engine.accumulation import Accumulation
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.graph.graph import Plan
 from deferred_ir.output.image import Image
@@ -33,7 +33,7 @@ class Picture:
 class Drawing:
     """What is drawn, and how often: `frames` pictures, each the mean of `accumulate` frames.
 
-    record: gets what the frames cost, None if that is not asked for.
+    measurement: gets what the frames cost, None if that is not asked for.
     """
 
     renderer: Renderer
@@ -42,7 +42,7 @@ class Drawing:
     seed: int
     frames: int = 1
     accumulate: int = 1
-    record: Record | None = None
+    measurement: Measurement | None = None
 
     def draw(self) -> Iterator[Picture]:
         """Draw and yield all pictures, up to one that is interrupted after some of its frames."""
@@ -50,11 +50,13 @@ class Drawing:
             for number in range(self.frames):
                 time = number / FRAMES_PER_SECOND
                 if self.accumulate == 1:
-                    self.renderer.draw(self.scene, self.plan, seed=self.seed, time=time, record=self.record)
+                    self.renderer.draw(self.scene, self.plan, seed=self.seed, time=time, measurement=self.measurement)
                     bar.advance()
                     yield Picture(number)
                     continue
-                mean = Accumulation(self.renderer, self.scene, self.plan, seed=self.seed, time=time, record=self.record)
+                mean = Accumulation(
+                    self.renderer, self.scene, self.plan, seed=self.seed, time=time, measurement=self.measurement
+                )
                 complete = _draw_frames(mean, self.accumulate, bar)
                 yield Picture(number, mean.frames, mean.image(), not complete)
                 if not complete:

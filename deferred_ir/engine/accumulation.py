@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from deferred_ir.base.errors import GraphError
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.graph.graph import Plan
 from deferred_ir.output.image import Image
 from deferred_ir.sampling.streams import frame_seed
@@ -28,9 +28,9 @@ LAP = "accumulate"
 class Accumulation:
     """Draws frames of `scene` at `time`, one by one, and averages them; frame k of seed s has frame_seed(s, k).
 
-    plan: one with the output radiance; all else that it makes images of must be made of that. record: gets one frame
-    for each image, its time all that was drawn for it, and the counters of each frame drawn. Raises GraphError where
-    the plan does not fit.
+    plan: one with the output radiance; all else that it makes images of must be made of that. measurement: gets one
+    frame for each image, its time all that was drawn for it, and the counters of each frame drawn. Raises GraphError
+    where the plan does not fit.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class Accumulation:
         *,
         seed: int = 0,
         time: float = 0.0,
-        record: Record | None = None,
+        measurement: Measurement | None = None,
     ) -> None:
         origin = renderer.graph().origin
         if "radiance" not in plan.outputs:
@@ -54,7 +54,7 @@ class Accumulation:
                 "ask for .npy or .exr only, or for one frame"
             )
         self._renderer, self._scene, self._seed, self._time = renderer, scene, seed, time
-        self._record, self._parts = record, Record() if record else None
+        self._measurement, self._parts = measurement, Measurement() if measurement else None
         self._adding_ms = 0.0
         self._sum: tuple[int, Any] = 0, 0.0
 
@@ -94,17 +94,17 @@ class Accumulation:
         with self._renderer.gpu.ctx:
             self._renderer.executor.resource(self._source).upload(total / done)
         self._run(self._seed, self._late)
-        if self._record and self._parts:
+        if self._measurement and self._parts:
             self._renderer.finish(self._parts)
             for figures in (self._parts.counters, self._parts.skipped):
                 figures.pop()  # of the passes that came after the frames
             self._parts.frame_ms.append(self._adding_ms)
             self._parts.laps.insert(-1, {LAP: (self._adding_ms, self._adding_ms)})
-            self._record.join(self._parts)
-            self._parts, self._adding_ms = Record(), 0.0
+            self._measurement.add_frame(self._parts)
+            self._parts, self._adding_ms = Measurement(), 0.0
 
     def _run(self, seed: int, steps: set[str]) -> None:
-        self._renderer.draw(self._scene, self._plan, seed=seed, time=self._time, record=self._parts, steps=steps)
+        self._renderer.draw(self._scene, self._plan, seed=seed, time=self._time, measurement=self._parts, steps=steps)
 
 
 def readers(plan: Plan, source: tuple[str, str]) -> set[str]:

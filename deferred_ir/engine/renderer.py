@@ -15,7 +15,7 @@ import numpy as np
 from deferred_ir.base.errors import GraphError, SettingError
 from deferred_ir.engine.accumulation import Accumulation
 from deferred_ir.engine.executor import Executor
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.settings import set_vpls
 from deferred_ir.frame.facts import collect_facts
 from deferred_ir.frame.frame import PARTS, Frame
@@ -163,10 +163,10 @@ class Renderer:
         *,
         seed: int = 0,
         time: float = 0.0,
-        record: Record | None = None,
+        measurement: Measurement | None = None,
         steps: Container[str] | None = None,
     ) -> None:
-        """Draw one frame and wait for it; what it took is added to `record`. steps: those to run, None for all."""
+        """Draw one frame and wait for it; what it took is added to `measurement`. steps: those to run, None for all."""
         if not isinstance(seed, Integral) or seed < 0:
             raise SettingError(f"seed {seed!r}: wants a whole number of 0 or more")
         if self._closed:
@@ -180,25 +180,25 @@ class Renderer:
             start += clock.perf_counter() - moved  # once a scene: not what a frame costs
             self._buffers.move(placed.geometry)
             frame = Frame(self.size, placed, self._buffers, self.tracer, seed, time, self.reuse, self._keep_all)
-            timers = self._timers if record else None
+            timers = self._timers if measurement else None
             with timers.frame() if timers else nullcontext():
                 self.executor.run(plan, frame, timers, steps=steps)
             self.gpu.ctx.finish()
             self.gpu.gl.check(f"a frame of {self.size[0]}x{self.size[1]}")
-            if record and timers:
-                record.frame_ms.append((clock.perf_counter() - start) * 1e3)
-                record.laps += timers.collect()
-                record.counters.append(dict(self.executor.counters))
-                record.skipped.append(self.executor.skipped)
+            if measurement and timers:
+                measurement.frame_ms.append((clock.perf_counter() - start) * 1e3)
+                measurement.laps += timers.collect()
+                measurement.counters.append(dict(self.executor.counters))
+                measurement.skipped.append(self.executor.skipped)
 
     def reset(self) -> None:
         """Drop what is kept from frame to frame: the next one starts afresh, and runs every pass."""
         self.executor.forget()
 
-    def finish(self, record: Record) -> None:
-        """Add the timestamps still in flight to `record`."""
+    def finish(self, measurement: Measurement) -> None:
+        """Add the timestamps still in flight to `measurement`."""
         with self.gpu.ctx:
-            record.laps += self._timers.collect(wait=True)
+            measurement.laps += self._timers.collect(wait=True)
 
     def read(self, plan: Plan) -> Image:
         """The image that the last `draw` of `plan` made."""

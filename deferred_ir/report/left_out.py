@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from deferred_ir.base.errors import DeviceError, GraphError
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.graph.graph import Plan
 from deferred_ir.graph.ports import Texture
 from deferred_ir.scene.scene import Scene
@@ -45,12 +45,12 @@ def of_scene(scene: Scene) -> list[LeftOut]:
     return [entry for absent, entry in found if absent]
 
 
-def of_frames(renderer: Renderer, plan: Plan, record: Record) -> list[LeftOut]:
-    """What the frames that `record` tells of did without, as the device has it after the last of them."""
-    executor, frames, last = renderer.executor, len(record.skipped), record.counters[-1]
+def of_frames(renderer: Renderer, plan: Plan, measurement: Measurement) -> list[LeftOut]:
+    """What the frames that `measurement` tells of did without, as the device has it after the last of them."""
+    executor, frames, last = renderer.executor, len(measurement.skipped), measurement.counters[-1]
     found = [
         LeftOut(name, f"in {n} of {frames} frames nothing that it is made of changed", ms)
-        for name, n, ms in record.reused()
+        for name, n, ms in measurement.skipped_passes()
     ]
     if dropped := last.get("lights_dropped", 0):
         found.append(LeftOut(f"maps of {dropped} lights", "they light nothing that is seen"))
@@ -94,11 +94,11 @@ def _timed(renderer: Renderer, scene: Scene, plan: Plan, *, vpls: int | None, se
     """GPU time of each pass that runs with `keep_all` and not in `plan`, ms."""
     full = renderer.plan(scene, vpls, keep_all=True)
     extra = {step.name for step in full.steps} - {step.name for step in plan.steps}
-    record, reuse, renderer.reuse = Record(), renderer.reuse, False
+    measurement, reuse, renderer.reuse = Measurement(), renderer.reuse, False
     try:
         for turn in range(1 + TURNS):
-            renderer.draw(scene, full, seed=seed, steps=extra, record=record if turn else None)
-        renderer.finish(record)
+            renderer.draw(scene, full, seed=seed, steps=extra, measurement=measurement if turn else None)
+        renderer.finish(measurement)
     finally:
         renderer.reuse = reuse
-    return {str(entry["name"]): float(entry["gpu_ms"]) for entry in record.passes()}
+    return {str(entry["name"]): float(entry["gpu_ms"]) for entry in measurement.passes()}

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.graph.file import graph_hash
 from deferred_ir.graph.graph import Graph, Plan
 from deferred_ir.report import left_out as savings
@@ -26,22 +26,22 @@ def run_record(
     plan: Plan,
     *,
     seed: int,
-    record: Record,
+    measurement: Measurement,
     accumulated: int = 1,
 ) -> dict[str, Any]:
     """The record of a run as plain data, in the order of the contract. accumulated: frames averaged in an image."""
     casting = graph.nodes.get("vpl")
-    last = record.counters[-1]
-    passes: list[dict[str, Any]] = [dict(entry) for entry in record.passes()]
+    last = measurement.counters[-1]
+    passes: list[dict[str, Any]] = [dict(entry) for entry in measurement.passes()]
     for entry in passes:
         step = next((step for step in plan.steps if step.name == entry["name"]), None)
         if step and (subpasses := step.work.subpasses(step.descriptions, renderer.executor.state(step.name))):
             entry["subpasses"] = [dict(subpass) for subpass in subpasses]
     memory = renderer.memory()
-    left_out = [*savings.of_scene(scene), *savings.of_frames(renderer, plan, record)]
+    left_out = [*savings.of_scene(scene), *savings.of_frames(renderer, plan, measurement)]
     lost = lost_light.estimate_for(plan, renderer.tracer)
     # Last, for it draws over what the frames have left.
-    time = (len(record.frame_ms) - 1) / FRAMES_PER_SECOND if scene.moves else 0.0
+    time = (len(measurement.frame_ms) - 1) / FRAMES_PER_SECOND if scene.moves else 0.0
     left_out += savings.of_passes(renderer, scene.at(time), plan, seed=seed)
     return {
         "scene": scene.name,
@@ -54,12 +54,12 @@ def run_record(
         "vpls_alive": last.get("vpls_alive", 0),
         "seed": seed,
         "device": renderer.gpu.device.name,
-        "frames": len(record.frame_ms),
+        "frames": len(measurement.frame_ms),
         "time": time,
         "accumulated": accumulated,
-        "frame_ms": record.median_frame_ms(),
+        "frame_ms": measurement.median_frame_ms(),
         "passes": passes,
-        "maps_drawn": [counters.get("maps_drawn", 0) for counters in record.counters],
+        "maps_drawn": [counters.get("maps_drawn", 0) for counters in measurement.counters],
         "stand_in": _stand_in(last),
         "left_out": [asdict(entry) for entry in left_out],
         "bias": lost,

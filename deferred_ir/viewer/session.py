@@ -16,7 +16,7 @@ import numpy as np
 
 from deferred_ir.base.errors import Error, GraphError
 from deferred_ir.engine.accumulation import Accumulation, readers
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import IMAGES, Renderer
 from deferred_ir.engine.settings import choose_settings
 from deferred_ir.gl.devices import Loader
@@ -231,14 +231,14 @@ class Session:
 
     def _frame(self) -> bool:
         """Draw a frame; whether any pass had to run."""
-        record = Record()
-        self.renderer.draw(self.shown, self.plan, seed=self.seed, record=record)
-        self.renderer.finish(record)
+        measurement = Measurement()
+        self.renderer.draw(self.shown, self.plan, seed=self.seed, measurement=measurement)
+        self.renderer.finish(measurement)
         skipped = frozenset(self.renderer.executor.skipped)
         if len(skipped) == len(self.plan.steps):
             return False
         self.skipped = skipped
-        self._keep(record)
+        self._keep(measurement)
         return True
 
     def _accumulate(self) -> bool:
@@ -258,11 +258,11 @@ class Session:
         noise = self._noise.of(self.accumulation) if self.accumulation else None
         return "" if noise is None else f", relMSE by noise about {noise:.2g}"
 
-    def _keep(self, record: Record) -> None:
-        self.frame_ms += record.frame_ms
-        for laps in record.laps:
+    def _keep(self, measurement: Measurement) -> None:
+        self.frame_ms += measurement.frame_ms
+        for laps in measurement.laps:
             self.laps |= laps
-        for counters in record.counters:
+        for counters in measurement.counters:
             self.counters |= counters
 
     def output(self, source: tuple[str, str]) -> Any:

@@ -23,7 +23,7 @@ from typing import Any
 
 import deferred_ir as ir
 from deferred_ir.base.progress import progress_bar
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.profiling.figures import markdown
 from deferred_ir.scene.motion import FRAMES_PER_SECOND, LissajousMotion
 from deferred_ir.scene.scene import Scene
@@ -142,10 +142,10 @@ def moving(scene: Scene) -> Scene:
 def stretch(one: ir.Renderer, scene: Scene, frames: int) -> ir.Image:
     """The last of some frames that begin afresh, each timed; the last frame of a shorter stretch is drawn anyway."""
     one.reset()
-    plan, record = one.plan(scene), Record()
+    plan, measurement = one.plan(scene), Measurement()
     for frame in [*range(frames - 1), STRETCH - 1]:
-        one.draw(scene, plan, time=frame / FRAMES_PER_SECOND, record=record)
-    one.finish(record)
+        one.draw(scene, plan, time=frame / FRAMES_PER_SECOND, measurement=measurement)
+    one.finish(measurement)
     return one.read(plan)
 
 

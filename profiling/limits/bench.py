@@ -20,7 +20,7 @@ from statistics import median, quantiles
 from typing import Any
 
 from deferred_ir.base.errors import Error
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.gl.context import Gpu
 from deferred_ir.loading.load import load
@@ -59,7 +59,7 @@ HOST: Mapping[str, Callable[..., list[float]]] = {
 
 def time_graphs(
     scene: Scene, graphs: Sequence[str], *, vpls: int, size: tuple[int, int], turns: int, device: str
-) -> dict[str, Record]:
+) -> dict[str, Measurement]:
     """Draw `turns` frames of each graph, in turns, a new seed in each turn. Returns their measurements."""
     with ExitStack() as stack:
         renderers = {
@@ -73,7 +73,7 @@ def time_graphs(
         return time_frames(scene, renderers, plans, turns, label=scene.name, new_seeds=True)
 
 
-def times(measured: Record, quantity: str) -> list[float]:
+def times(measured: Measurement, quantity: str) -> list[float]:
     """Return the milliseconds of each frame.
 
     quantity: `frame` (wall time), `shading` (wall time without the shadow maps) or a pass (GPU time).

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.errors import SettingError
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.graph.graph import Plan
 from deferred_ir.loading.load import load
@@ -44,7 +44,7 @@ class Variant:
 
     renderer: Renderer
     plan: Plan
-    times: Record = field(default_factory=Record)
+    times: Measurement = field(default_factory=Measurement)
     errors: list[float] = field(default_factory=list)
 
 
@@ -68,7 +68,7 @@ def measure(scene: Scene, truth: Mapping[str, Any], table: str, chosen: argparse
             variants[name] = Variant(renderer, renderer.plan(scene, chosen.vpls, ["radiance"]))
             renderer.draw(scene, variants[name].plan, seed=chosen.seeds)  # compiles and allocates: is not measured
         for seed, variant in take_turns(list(variants.values()), chosen.seeds, f"{scene.name}, {table}"):
-            variant.renderer.draw(scene, variant.plan, seed=seed, record=variant.times)
+            variant.renderer.draw(scene, variant.plan, seed=seed, measurement=variant.times)
             image = variant.renderer.read(variant.plan).radiance
             variant.errors.append(relmse(image, truth["image"], truth["hit"])[0])
         for variant in variants.values():

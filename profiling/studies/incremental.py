@@ -20,7 +20,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools
 from deferred_ir.base.progress import track
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
 from deferred_ir.profiling.figures import markdown
@@ -67,14 +67,14 @@ def times(scene: Scene, size: tuple[int, int]) -> dict[str, Any]:
     with ExitStack() as stack:
         retained, fresh = (stack.enter_context(Renderer(size, graph)) for graph in ("incremental", "interleaved"))
         plans = {one: one.plan(scene, VPLS) for one in (retained, fresh)}
-        measured = {one: Record() for one in plans}
+        measured = {one: Measurement() for one in plans}
         fresh.draw(scene, plans[fresh])
         for frame in range(WARM):
             retained.draw(scene, plans[retained], time=frame / FRAMES_PER_SECOND)
         for turn, one in take_turns(list(plans), MOVING, f"{scene.name}, times"):
-            one.draw(scene, plans[one], time=(WARM + turn) / FRAMES_PER_SECOND, record=measured[one])
-        for one, record in measured.items():
-            one.finish(record)
+            one.draw(scene, plans[one], time=(WARM + turn) / FRAMES_PER_SECOND, measurement=measured[one])
+        for one, measurement in measured.items():
+            one.finish(measurement)
 
     def ms(one: Renderer) -> float:
         return median(laps["vpl"][0] + laps["shadow_maps"][0] for laps in measured[one].laps)

@@ -12,7 +12,7 @@ from typing import Any
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import GraphError, SettingError
 from deferred_ir.base.progress import progress_bar
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import IMAGES, Renderer
 from deferred_ir.gl.context import Gpu
 from deferred_ir.graph.file import graph_hash, load_graph
@@ -178,12 +178,14 @@ def _measure(
     scene = sweep.scene
     images = [name for name in renderer.graph(key.vpls).outputs if name in IMAGES]
     plan = renderer.plan(scene, key.vpls, images)
-    record = Record()
+    measurement = Measurement()
     times = sweep.frames(plan)
     for i, time in enumerate(times):  # the first compiles, allocates: not what a frame costs
-        renderer.draw(scene, plan, seed=key.seed, time=time, record=record if i >= len(times) - FRAMES else None)
+        renderer.draw(
+            scene, plan, seed=key.seed, time=time, measurement=measurement if i >= len(times) - FRAMES else None
+        )
     image = renderer.read(plan)
-    renderer.finish(record)
+    renderer.finish(measurement)
     names = (f"{graph}, {key.vpls} VPLs, seed {key.seed}", "the reference")
     result = compare(image.radiance, truth.radiance, truth.hit, names=names, flip_parameters=flip_parameters)
     pictures = key.seed == 0 and image.display is not None
@@ -192,8 +194,8 @@ def _measure(
         image.save(display)
         errors = error_picture.signed_error(image.radiance, truth.radiance, result.reference_mean)
         error_picture.save(error, errors)
-    memory, alive = renderer.memory(), record.counters[-1].get("vpls_alive", 0)
-    left_out = savings.of_frames(renderer, plan, record)
+    memory, alive = renderer.memory(), measurement.counters[-1].get("vpls_alive", 0)
+    left_out = savings.of_frames(renderer, plan, measurement)
     left_out += savings.of_passes(renderer, sweep.moment, plan, vpls=key.vpls, seed=key.seed)
     point = Point(
         key=key,
@@ -204,8 +206,8 @@ def _measure(
         device=renderer.gpu.device.name,
         software=renderer.gpu.device.kind == "software",
         vpls_alive=alive,
-        frames=[round(ms, 4) for ms in record.frame_ms],
-        laps=[[(name, round(gpu, 4), round(cpu, 4)) for name, (gpu, cpu) in laps.items()] for laps in record.laps],
+        frames=[round(ms, 4) for ms in measurement.frame_ms],
+        laps=[[(name, round(gpu, 4), round(cpu, 4)) for name, (gpu, cpu) in laps.items()] for laps in measurement.laps],
         memory=memory,
         left_out=left_out,
         time=sweep.time if scene.moves else None,

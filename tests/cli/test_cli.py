@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from deferred_ir.cli.main import main
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
 
@@ -133,17 +133,17 @@ def test_run_json_holds_what_the_contract_promises(tmp_path):
 
 
 def test_the_passes_times_add_up_to_the_frame():
-    scene, record = load("cornell"), Record()
+    scene, measurement = load("cornell"), Measurement()
     with Renderer((256, 256), device="software") as renderer:
         plan = renderer.plan(scene, 64)
         renderer.draw(scene, plan)
         for _ in range(9):
-            renderer.draw(scene, plan, record=record)
-        renderer.finish(record)
-    sums = [sum(gpu for gpu, _ in laps.values()) for laps in record.laps]
-    shares = [total / frame for total, frame in zip(sums, record.frame_ms, strict=True)]
+            renderer.draw(scene, plan, measurement=measurement)
+        renderer.finish(measurement)
+    sums = [sum(gpu for gpu, _ in laps.values()) for laps in measurement.laps]
+    shares = [total / frame for total, frame in zip(sums, measurement.frame_ms, strict=True)]
     assert median(shares) == pytest.approx(1, abs=0.1)
-    assert list(record.laps[0]) == [step.name for step in plan.steps]
+    assert list(measurement.laps[0]) == [step.name for step in plan.steps]
 
 
 def test_only_the_asked_outputs_are_made(tmp_path):

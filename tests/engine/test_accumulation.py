@@ -17,7 +17,7 @@ from small_scenes import room
 from deferred_ir.base.errors import GraphError, SettingError
 from deferred_ir.cli.main import main
 from deferred_ir.engine.accumulation import Accumulation, readers
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import graph_names
@@ -190,18 +190,18 @@ def test_a_number_of_frames_that_is_none_is_one_line(renderer, count):
 
 
 def test_the_record_has_one_frame_for_each_picture_and_all_its_time(renderer):
-    one, record = renderer(SIZE), Record()
+    one, measurement = renderer(SIZE), Measurement()
     plan = one.plan(room(), 8)
     one.draw(room(), plan)
     for _ in range(2):
-        added = Accumulation(one, room(), plan, record=record)
+        added = Accumulation(one, room(), plan, measurement=measurement)
         for _ in range(6):
             added.draw()
         added.image()
-    one.finish(record)
-    assert len(record.frame_ms) == len(record.laps) == 2
-    assert record.counters == 12 * [{"vpls_alive": 8, "maps_drawn": 9, "lights_dropped": 0, "lights_skipped": 0}]
-    for laps, wall in zip(record.laps, record.frame_ms, strict=True):
+    one.finish(measurement)
+    assert len(measurement.frame_ms) == len(measurement.laps) == 2
+    assert measurement.counters == 12 * [{"vpls_alive": 8, "maps_drawn": 9, "lights_dropped": 0, "lights_skipped": 0}]
+    for laps, wall in zip(measurement.laps, measurement.frame_ms, strict=True):
         assert list(laps) == ["vpl", "gbuffer", "shadow_maps", "lighting", "accumulate", "tonemap"]
         assert 0.7 * wall < sum(cpu for _, cpu in laps.values()) < wall
 

@@ -10,7 +10,7 @@ import pytest
 from small_scenes import build, plane, room, textured
 
 from deferred_ir.base.errors import DeviceError, GraphError, SettingError
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.timers import DELAY
@@ -185,29 +185,29 @@ def test_time_moves_what_moves(renderer):
 
 
 def test_every_pass_is_timed_in_every_frame(renderer):
-    one, scene, record = renderer(SIZE), room(), Record()
+    one, scene, measurement = renderer(SIZE), room(), Measurement()
     plan = one.plan(scene, 8)
     for frame in range(DELAY + 2):
-        one.draw(scene, plan, record=record)
-        assert len(record.laps) == max(0, frame + 1 - DELAY)  # never waits for the device
-    one.finish(record)
-    assert len(record.laps) == len(record.frame_ms) == len(record.counters) == DELAY + 2
+        one.draw(scene, plan, measurement=measurement)
+        assert len(measurement.laps) == max(0, frame + 1 - DELAY)  # never waits for the device
+    one.finish(measurement)
+    assert len(measurement.laps) == len(measurement.frame_ms) == len(measurement.counters) == DELAY + 2
     steps = [step.name for step in plan.steps]
-    assert [entry["name"] for entry in record.passes()] == steps
-    for laps, wall in zip(record.laps, record.frame_ms, strict=True):
+    assert [entry["name"] for entry in measurement.passes()] == steps
+    for laps, wall in zip(measurement.laps, measurement.frame_ms, strict=True):
         assert list(laps) == steps
         assert all(gpu >= 0 and cpu > 0 for gpu, cpu in laps.values())
         assert sum(cpu for _, cpu in laps.values()) < wall
         assert sum(gpu for gpu, _ in laps.values()) < wall
-    assert record.counters[-1] == {"vpls_alive": 8, "maps_drawn": 9, "lights_dropped": 0, "lights_skipped": 0}
-    assert record.median_frame_ms() == pytest.approx(np.median(record.frame_ms), abs=1e-4)
+    assert measurement.counters[-1] == {"vpls_alive": 8, "maps_drawn": 9, "lights_dropped": 0, "lights_skipped": 0}
+    assert measurement.median_frame_ms() == pytest.approx(np.median(measurement.frame_ms), abs=1e-4)
 
 
 def test_frames_without_a_record_leave_no_times(renderer):
-    one, scene, record = renderer(SIZE), room(), Record()
+    one, scene, measurement = renderer(SIZE), room(), Measurement()
     one.render(scene, vpls=4)
-    one.finish(record)
-    assert record == Record()
+    one.finish(measurement)
+    assert measurement == Measurement()
 
 
 # What is refused

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from small_scenes import build, crooked_room, plane, room
 
 from deferred_ir.base.errors import GraphError
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.meshes.subdivide import subdivide
 from deferred_ir.report.run_json import run_record
 
@@ -184,14 +184,14 @@ def test_the_spotlight_draws_the_scene_itself(renderer):
 @pytest.mark.parametrize("graph", ["deferred", "forward"])
 @pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
 def test_the_mesh_is_told_of_where_there_is_one(renderer, graph, projection):
-    scene, record = room(), Record()
+    scene, measurement = room(), Measurement()
     one = renderer((32, 32), graph, set=PRE | {"shadow_maps.projection": projection, "shadow_maps.edge": 0.1})
     plan = one.plan(scene, 8)
     one.draw(scene, one.plan(scene, 0))
     before = one.memory()["buffers"]
-    one.draw(scene, plan, record=record)
-    one.finish(record)
-    told = run_record(one, scene, graph, one.graph(8), plan, seed=0, record=record)["stand_in"]
+    one.draw(scene, plan, measurement=measurement)
+    one.finish(measurement)
+    told = run_record(one, scene, graph, one.graph(8), plan, seed=0, measurement=measurement)["stand_in"]
     if projection == "perspective":
         assert told is None
         return

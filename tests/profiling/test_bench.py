@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.loading.load import load
 from deferred_ir.profiling.figures import markdown
 from deferred_ir.profiling.limits import bench
@@ -58,10 +58,10 @@ def test_the_limit_of_shadow_maps_draws_the_atlas(renderer, vpls):
 
 def test_times_are_taken_from_frames_and_passes():
     laps = [{"shadow_maps": (2.0, 9.0), "lighting": (3.0, 9.0)}, {"shadow_maps": (1.0, 9.0), "lighting": (4.0, 9.0)}]
-    record = Record([10.0, 20.0], laps)
-    assert bench.times(record, "frame") == [10, 20]
-    assert bench.times(record, "shading") == [8, 19]
-    assert bench.times(record, "lighting") == [3, 4]
+    measurement = Measurement([10.0, 20.0], laps)
+    assert bench.times(measurement, "frame") == [10, 20]
+    assert bench.times(measurement, "shading") == [8, 19]
+    assert bench.times(measurement, "lighting") == [3, 4]
 
 
 def test_the_spread_of_ratios_is_their_median_and_quartiles():

@@ -10,7 +10,7 @@ from small_scenes import gable, room, smooth_scene
 
 from deferred_ir.base.errors import DeviceError
 from deferred_ir.engine.accumulation import Accumulation
-from deferred_ir.engine.record import Record
+from deferred_ir.engine.measurement import Measurement
 from deferred_ir.gl.formats import FORMATS
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.ports import Texture
@@ -23,12 +23,12 @@ SIZE = (48, 48)
 def told(renderer, scene, graph, outputs=None, **settings):
     """Entries by what was left out, of two frames."""
     one = renderer(SIZE, graph, set=settings)
-    plan, record = one.plan(scene, outputs=outputs), Record()
+    plan, measurement = one.plan(scene, outputs=outputs), Measurement()
     for _ in range(2):
-        one.draw(scene, plan, record=record)
-    one.finish(record)
+        one.draw(scene, plan, measurement=measurement)
+    one.finish(measurement)
     before = one.memory()
-    entries = savings.of_frames(one, plan, record) + savings.of_passes(one, scene, plan)
+    entries = savings.of_frames(one, plan, measurement) + savings.of_passes(one, scene, plan)
     return {entry.what: entry for entry in entries}, one.memory()["textures"] - before["textures"]
 
 
@@ -73,13 +73,13 @@ def _refuse(error, *_, **__):
 
 
 def test_frames_of_a_mean_are_counted_without_what_shows_it(renderer):
-    one, record = renderer(SIZE, set={"vpl.count": 4}, reuse=True), Record()
-    mean = Accumulation(one, room(), one.plan(room()), record=record)
+    one, measurement = renderer(SIZE, set={"vpl.count": 4}, reuse=True), Measurement()
+    mean = Accumulation(one, room(), one.plan(room()), measurement=measurement)
     for _ in range(3):
         mean.draw()
     mean.show()
-    assert record.skipped == [(), ("gbuffer",), ("gbuffer",)]
-    assert record.reused()[0][:2] == ("gbuffer", 2)
+    assert measurement.skipped == [(), ("gbuffer",), ("gbuffer",)]
+    assert measurement.skipped_passes()[0][:2] == ("gbuffer", 2)
 
 
 def test_what_is_a_choice_is_not_measured(renderer):

@@ -109,17 +109,17 @@ def _open_renderer(arguments: argparse.Namespace, scene: Scene, settings: Mappin
 def _prepare_drawing(renderer: Renderer, scene: Scene, files: ImageFiles, arguments: argparse.Namespace) -> Drawing:
     """Plan what the files need. With --json a first frame compiles and allocates: that is not what frames cost."""
     from deferred_ir.cli.drawing import Drawing
-    from deferred_ir.engine.record import Record
+    from deferred_ir.engine.measurement import Measurement
     from deferred_ir.engine.settings import choose_seed
 
     outputs = files.choose_outputs(renderer.graph().outputs, averaged=arguments.accumulate > 1)
     plan = renderer.plan(scene, outputs=None if arguments.keep_all else outputs)
     seed = choose_seed(arguments.seed, scene.render)
-    record = Record() if arguments.json is not None else None
-    if record:
+    measurement = Measurement() if arguments.json is not None else None
+    if measurement:
         renderer.draw(scene, plan, seed=seed)
         renderer.reset()
-    return Drawing(renderer, scene, plan, seed, arguments.frames, arguments.accumulate, record)
+    return Drawing(renderer, scene, plan, seed, arguments.frames, arguments.accumulate, measurement)
 
 
 def _describe_run(drawing: Drawing, arguments: argparse.Namespace, averaged: int) -> dict[str, Any]:
@@ -127,12 +127,19 @@ def _describe_run(drawing: Drawing, arguments: argparse.Namespace, averaged: int
     from deferred_ir.engine.settings import choose_graph
     from deferred_ir.report.run_json import run_record
 
-    renderer, scene, record = drawing.renderer, drawing.scene, drawing.record
-    assert record is not None
-    renderer.finish(record)
+    renderer, scene, measurement = drawing.renderer, drawing.scene, drawing.measurement
+    assert measurement is not None
+    renderer.finish(measurement)
     graph = choose_graph(arguments.graph, scene.render)
     return run_record(
-        renderer, scene, graph, renderer.graph(), drawing.plan, seed=drawing.seed, record=record, accumulated=averaged
+        renderer,
+        scene,
+        graph,
+        renderer.graph(),
+        drawing.plan,
+        seed=drawing.seed,
+        measurement=measurement,
+        accumulated=averaged,
     )
 
 

@@ -1,4 +1,4 @@
-"""Medians over the frames of a run, as RUN.json and the profiler report them."""
+"""What the frames of a run took, and the medians that RUN.json and the profiler report."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from statistics import median
 
 
 @dataclass
-class Record:
-    """What repeated frames took. Times in milliseconds; `laps` holds for each frame label -> (GPU, CPU).
+class Measurement:
+    """Times, counters and skipped passes of repeated frames, an entry a frame.
 
-    skipped: for each frame the passes that did not run, since what they had written was still right.
+    frame_ms: wall time in milliseconds. laps: by pass, (GPU, CPU) milliseconds. skipped: names of the passes that did
+    not run, because their outputs still held what they would have written.
     """
 
     frame_ms: list[float] = field(default_factory=list)
@@ -20,7 +21,7 @@ class Record:
     counters: list[dict[str, int]] = field(default_factory=list)
     skipped: list[tuple[str, ...]] = field(default_factory=list)
 
-    def join(self, parts: Record) -> None:
+    def add_frame(self, parts: Measurement) -> None:
         """Add one frame that was drawn in parts: times are added up, counters stay those of each part."""
         laps: dict[str, tuple[float, float]] = {}
         for lap in parts.laps:
@@ -33,20 +34,20 @@ class Record:
         self.skipped += parts.skipped
 
     def passes(self) -> list[dict[str, float | str]]:
-        """Name, GPU and CPU median of each pass, in the order in which they ran; 0 in frames that kept its outputs."""
+        """Return name, GPU and CPU median of each pass in the order in which they ran; 0 in frames that skipped it."""
         names = list(dict.fromkeys(label for frame in self.laps for label in frame))
         rest = dict.fromkeys(names, (0.0, 0.0))
         laps = [{**rest, **frame} for frame in self.laps]
         return [{"name": name, "gpu_ms": _median(laps, name, 0), "cpu_ms": _median(laps, name, 1)} for name in names]
 
-    def reused(self) -> list[tuple[str, int, float | None]]:
-        """Passes that did not run in all frames: name, in how many not, and their GPU median where they ran."""
+    def skipped_passes(self) -> list[tuple[str, int, float | None]]:
+        """Return the passes that some frames skipped: name, number of these frames, GPU median of the others."""
         frames = Counter(name for skipped in self.skipped for name in skipped)
         ran = {name: [frame for frame in self.laps if name in frame] for name in frames}
         return [(name, n, _median(ran[name], name, 0) if ran[name] else None) for name, n in frames.items()]
 
     def median_frame_ms(self) -> float:
-        """Median wall time of a whole frame."""
+        """Return the median wall time of a whole frame."""
         return round(median(self.frame_ms), 4)
 
 

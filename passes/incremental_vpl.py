@@ -81,7 +81,7 @@ class IncrementalVpl(Pass):
         state.key, state.vpls = key, all_vpls
         if not all_vpls.at_rest:
             io.repeat()
-        versions = np.append(all_vpls.spot_version(light), all_vpls.version[vpls.ray])
+        versions = np.append(all_vpls.find_spot_version(light), all_vpls.version[vpls.ray])
         lights.write(packed(frame.scene, vpls, p, vpls.ray), versions)
         io.report("vpls_alive", len(vpls))
         io.report("vpls_waiting", all_vpls.waiting)

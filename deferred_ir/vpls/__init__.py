@@ -1,1 +1,1 @@
-"""The laboratory of many lights: casting, choosing, keeping and summing VPLs. No OpenGL."""
+"""Virtual point lights (VPLs): casting, resampling, reuse over frames, interleaving, and sums by rays. No OpenGL."""

@@ -1,13 +1,14 @@
 """VPLs that outlive their frame while the spotlight moves (Laine et al. 2007, "Incremental Instant Radiosity", EGSR).
 
-A VPL is a site in the disc of directions that the spotlight sends light to, in which equal areas get equal light. Each
-frame sites that the light no longer reaches are given up at once, and a few new ones fill the largest holes; each
-carries the light of its Voronoi cell, so all of the light is accounted for however many sites there are.
+Each VPL has a site in the disc of the spotlight's directions, on which equal areas get equal light. In each frame the
+sites that the light no longer reaches are removed, and a few new ones fill the largest holes. Each carries the light of
+its Voronoi cell, so all of the light is accounted for however many sites there are.
 
-A ray that misses stands for its site, too: the light of its cell is lost, and the hole is not tried again.
+A ray that hits nothing keeps its site: the light of its cell is lost, and the hole is not tried again.
 
-Where models move, VPLs that they hide from the light are given up. Those on them go with them: sites and validity at
-once, their light when there is budget for its map. Until then it shines from where it was.
+Moving models: VPLs that a model hides from the light are removed. A VPL on a model moves with it: its site and its
+visibility from the light follow at once, but it is shaded from where its map was last drawn, until there is budget to
+redraw the map.
 """
 
 from __future__ import annotations
@@ -29,22 +30,22 @@ from deferred_ir.vpls.kernel import cosine_ratio
 from deferred_ir.vpls.stale_maps import StaleMaps
 
 BETTER = 1.05
-"""A site is moved if its nearest neighbour will be farther by this factor. Above 1, so that it comes to an end."""
+"""How much farther its nearest neighbour must be for a site to be moved. Above 1, so that moving comes to an end."""
 MARGIN = 0.9
-"""New sites stay off the rim by this, over the root of their number: about half their distance from one another."""
+"""Distance of new sites from the rim, times the root of the number of sites: about half the distance between them."""
 RESERVED = 8
-"""One map in so many is for VPLs that are there already, however many are new: a hole is worse than a map that lags."""
+"""One in this many maps of a frame is reserved for redrawing stale ones; new VPLs come first, for a hole is worse."""
 FARTHEST = 0.1
-"""VPLs on moving models that shine from farther behind than this, in diagonals, are given up."""
+"""Distance between a VPL and where it is shaded from beyond which it is removed, in diagonals."""
 GOLDEN = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of the additive sequence in the unit square whose points keep apart best (Roberts 2018, R2)."""
 
 
 class IncrementalVpls:
-    """At most `count` sites and what the rays through them met. Slot i keeps its VPL until that is given up.
+    """Up to `count` sites, and the surfaces that the rays through them hit. Slot i holds its VPL until it is removed.
 
     The same `seed` and the same frames give the same VPLs again. at_rest: the last frame changed no site and left no
-    map stale, so the next one will not change anything either if nothing moves.
+    map stale, so while nothing moves, the next one changes nothing either.
     """
 
     at_rest = False
@@ -61,25 +62,24 @@ class IncrementalVpls:
         self.version = np.zeros(count, np.int64)
         self.start = np.zeros((count, 2))
         self.direction, self.position, self.normal, self.shading_normal, self.albedo = np.zeros((5, count, 3))
-        # Of those on moving models, where they were when their maps were drawn: there they shine from.
-        self.shown, self.shown_normal = np.zeros((2, count, 3))
+        # VPLs on moving models are shaded from where their map was last drawn, until it is redrawn.
+        self.shaded_position, self.shaded_normal = np.zeros((2, count, 3))
 
     def update(self, light: Spotlight, tracer: Tracer, *, least: int, most: int) -> Vpls:
-        """The VPLs of the next frame, `ray` being their slots.
+        """Advance to the next frame. Returns its VPLs, `ray` being their slots.
 
-        light: where it is now. most: maps that may be drawn, of new sites or of those that show a model where it was;
-        1 in RESERVED is the latter's if they need it. least: sites that may be new or moved to where they are of more
-        use, as far as `most` goes.
+        most: new and stale maps that the frame may draw; 1 in RESERVED is for stale ones, if there are any. least:
+        sites that may be new or moved to where they are of more use, within `most`.
         """
-        self._turn(light)
+        self._turn_basis(light)
         disc = EmissionDisc(light, self._axes(light))
-        self._give_up(light, tracer, disc)
-        whole, most = most, most - min(most // RESERVED, int(self._maps.stale.sum()))
+        self._begin_frame(light, tracer, disc)
+        budget, most = most, most - min(most // RESERVED, int(self._maps.stale.sum()))
         slots = np.flatnonzero(self.used)
         cells = Cells(disc.project(self.direction[slots]))
         free = np.flatnonzero(~self.used)[:most]
         for _ in free:
-            cells.add(self._hole(cells)[0])
+            cells.add(self._find_hole(cells)[0])
         slots = np.concatenate([slots, free])
         cells, moved = self._spread(cells, min(least, most) - len(free))
         slots = np.append(np.delete(slots, moved), slots[moved])
@@ -89,21 +89,21 @@ class IncrementalVpls:
         place = np.zeros((len(self.used), 2))
         place[slots] = cells.sites
         self._shoot(light, tracer, fresh, disc.unproject(place[fresh]))
-        again = self._maps.worst(self.weights * self.albedo.sum(axis=1), whole - len(fresh))
-        self.version[again] = new_versions(len(again))
-        drawn = np.union1d(fresh, again)
-        self._maps.drawn(drawn)
-        self.shown[drawn], self.shown_normal[drawn] = self.position[drawn], self.normal[drawn]
+        redrawn = self._maps.find_worst(self.weights * self.albedo.sum(axis=1), budget - len(fresh))
+        self.version[redrawn] = new_versions(len(redrawn))
+        drawn = np.union1d(fresh, redrawn)
+        self._maps.mark_drawn(drawn)
+        self.shaded_position[drawn], self.shaded_normal[drawn] = self.position[drawn], self.normal[drawn]
         self.at_rest = not len(fresh) and not self._maps.stale.any()
-        return self._lit(light, disc.power)
+        return self._make_vpls(light, disc.power)
 
     @property
     def waiting(self) -> int:
-        """Rays that the budget has not allowed so far."""
+        """How many sites the budget has not allowed so far."""
         return int((~self.used).sum())
 
-    def _give_up(self, light: Spotlight, tracer: Tracer, disc: EmissionDisc) -> None:
-        """Begin a frame: VPLs go with their models; those that are not reached any more go, and maps become stale."""
+    def _begin_frame(self, light: Spotlight, tracer: Tracer, disc: EmissionDisc) -> None:
+        """Move VPLs with their models, remove those that the light no longer reaches, and age the others' maps."""
         geometry = tracer.scene.geometry
         moves = self._maps.follow(geometry)
         for number, move in moves.items():
@@ -111,32 +111,33 @@ class IncrementalVpls:
             self.position[own] = transform_points(self.position[own], move)
             for normals in (self.normal, self.shading_normal):
                 normals[own] = normals[own] @ move[:3, :3].T
-        self.used &= self._reached(light, tracer, disc) & (self._lag() <= FARTHEST * geometry.diagonal)
+        self.used &= self._find_reached(light, tracer, disc) & (self._measure_lag() <= FARTHEST * geometry.diagonal)
         on_moved = np.isin(self._group, np.array(list(moves), int) + 1)
-        self._maps.age(self._maps.see(self.shown, self.shown_normal), on_moved, self.shown)
-        self._maps.stale &= self._shines()
-        if self._maps.see(np.array([light.position]), light.axis[None]).any():
+        changed = self._maps.find_changed(self.shaded_position, self.shaded_normal)
+        self._maps.age(changed, on_moved, self.shaded_position)
+        self._maps.stale &= self._find_alive()
+        if self._maps.find_changed(np.array([light.position]), light.axis[None]).any():
             self._spot = None, 0
 
-    def _lag(self) -> Array:
-        """How far each VPL is from where it shines from, (count,)."""
-        lag: Array = np.linalg.norm(self.position - self.shown, axis=1) * (self._group > 0)
+    def _measure_lag(self) -> Array:
+        """Return how far each VPL is from where it is shaded from, (count,)."""
+        lag: Array = np.linalg.norm(self.position - self.shaded_position, axis=1) * (self._group > 0)
         return lag
 
-    def _shines(self) -> Bools:
-        """Which slots have a VPL, and so a map."""
-        shines: Bools = self.used & self.landed & (self.albedo > 0).any(axis=1)
-        return shines
+    def _find_alive(self) -> Bools:
+        """Return which slots have a VPL, and so a map, bool (count,)."""
+        alive: Bools = self.used & self.landed & (self.albedo > 0).any(axis=1)
+        return alive
 
-    def spot_version(self, light: Spotlight) -> int:
-        """A number that changes when the spotlight sees something else than before."""
+    def find_spot_version(self, light: Spotlight) -> int:
+        """Return a version that changes whenever the spotlight's map would."""
         view = (light.position, light.look_at, light.fov)
         if view != self._spot[0]:
             self._spot = view, new_version()
         return self._spot[1]
 
-    def _turn(self, light: Spotlight) -> None:
-        """Carry the disc's frame along with the axis, so that points of a disc light stay where they are on it."""
+    def _turn_basis(self, light: Spotlight) -> None:
+        """Turn the disc's basis along with the axis, so that points of a disc light keep their places on it."""
         right = self._right - (self._right @ light.axis) * light.axis
         length = np.linalg.norm(right)
         self._right = right / length if length > 0.1 else build_basis(light.axis)[0]
@@ -148,8 +149,8 @@ class IncrementalVpls:
         origins: Array = np.asarray(light.position, float) + light.radius * self.start @ self._axes(light)
         return origins
 
-    def _reached(self, light: Spotlight, tracer: Tracer, disc: EmissionDisc) -> Bools:
-        """Which sites in use the light still reaches as it did; their directions are those from where it is now."""
+    def _find_reached(self, light: Spotlight, tracer: Tracer, disc: EmissionDisc) -> Bools:
+        """Update the sites' directions, and return which of those in use the light still reaches, bool (count,)."""
         chosen = np.flatnonzero(self.used & self.landed)
         origins = self._origins(light)
         way = self.position[chosen] - origins[chosen]
@@ -166,16 +167,17 @@ class IncrementalVpls:
         reached[missed] &= ~tracer.closest(origins[missed], self.direction[missed]).hit
         return reached
 
-    def _hole(self, cells: Cells) -> tuple[Array, float]:
-        """Where the next site goes, and how far it is from the others."""
+    def _find_hole(self, cells: Cells) -> tuple[Array, float]:
+        """Return where the next site goes, (2,), and how far it is from the others."""
         if not len(cells.sites):
             return unit_disc(self._rng.random((1, 2)))[0] / 2, np.inf
         return cells.emptiest(1 - MARGIN / np.sqrt(len(cells.sites) + 1))
 
     def _spread(self, cells: Cells, most: int) -> tuple[Cells, list[int]]:
-        """Up to `most` of the most crowded sites put where there is most room, and their rows before; they come last.
+        """Move up to `most` of the most crowded sites to where there is most room.
 
-        The shortest distance between sites grows or fewer are as close, so with a still light it comes to an end.
+        Returns the cells, those that were moved last, and the rows that these had before. The shortest distance between
+        sites grows, or fewer sites are as close, so with a still light it comes to an end.
         """
         count = min(most, len(cells.sites) - 1)
         while count > 0:
@@ -187,7 +189,7 @@ class IncrementalVpls:
                 left = np.delete(left, row)
             other = Cells(cells.sites[left])
             for _ in range(count):
-                site, distance = self._hole(other)
+                site, distance = self._find_hole(other)
                 other.add(site)
                 far.append(distance)
             worth = next((i for i in range(count) if far[i] <= BETTER * near[i]), count)
@@ -197,7 +199,7 @@ class IncrementalVpls:
         return cells, []
 
     def _shoot(self, light: Spotlight, tracer: Tracer, slots: Ints, directions: Array) -> None:
-        """Rays along `directions` (m, 3), into `slots`."""
+        """Trace a ray along each of `directions` (m, 3) and store what it hits in `slots` (m,)."""
         order = self._born + np.arange(len(slots))
         self._born += len(slots)
         self.start[slots] = unit_disc((self._offset + np.multiply.outer(order, GOLDEN)) % 1)
@@ -209,11 +211,11 @@ class IncrementalVpls:
         self.normal[slots], self.shading_normal[slots] = hits.normal, hits.shading_normal
         self.version[slots] = new_versions(len(slots))
 
-    def _lit(self, light: Spotlight, power: float) -> Vpls:
-        """What is there; each VPL carries the light of its cell."""
-        slots = np.flatnonzero(self._shines())
+    def _make_vpls(self, light: Spotlight, power: float) -> Vpls:
+        """Return the VPLs that are alive, each with the light of its cell."""
+        slots = np.flatnonzero(self._find_alive())
         direction = self.direction[slots]
         power_of_cells = np.multiply.outer(power * self.weights[slots], np.asarray(light.emission, float))
         ratio = cosine_ratio(self.normal[slots], self.shading_normal[slots], direction)
         emission = power_of_cells * self.albedo[slots] * ratio[:, None]
-        return Vpls(self.shown[slots], self.shown_normal[slots], emission, slots)
+        return Vpls(self.shaded_position[slots], self.shaded_normal[slots], emission, slots)

@@ -1,7 +1,7 @@
-"""Which VPLs each pixel sees, by exact shadow rays: bit masks that stand in for shadow maps.
+"""Find which VPLs each pixel sees by exact shadow rays: bit masks that replace shadow maps.
 
-With interleaved sampling a pixel asks only its share of the VPLs, and so few rays can cost less than a map of the whole
-scene for each VPL. Pairs that bring nothing, since one of the two faces away, are never traced.
+With interleaved sampling a pixel needs only its share of the VPLs, and so few rays can cost less than a map of the
+whole scene for each VPL. No ray is traced where pixel or VPL faces away.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ BITS = 32
 """VPLs in a word."""
 
 Share = tuple[Ints, slice]
-"""Rows of surfaces, and the VPLs that light them."""
+"""Rows of surfaces, and the slice of VPLs that light them."""
 
 
 def trace_masks(

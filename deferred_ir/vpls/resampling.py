@@ -1,15 +1,15 @@
-"""VPLs where the camera needs them: of many candidates those are kept that light what it sees, unbiased.
+"""Choose VPLs that light what the camera sees from among many candidates, unbiased.
 
-Each candidate's effect on the image is estimated at PROBES of its pixels: what it adds to a pixel, shadow ray
-included, over what all candidates together add there. Systematic resampling then draws a few, with probabilities that
-are partly even and partly go with the root of the sum of the squared effects, which makes the variance of
-independent draws least. A candidate's power is divided by its probability, so the mean stays what it was.
+A candidate's effect is estimated at PROBES pixels of the image: the light that it adds to a pixel, shadows included,
+over the light that all candidates add there. Systematic resampling then draws a few, with probabilities that are in
+part even and in part proportional to the root of the sum of the squared effects, which minimises the variance of
+independent draws. A candidate's power is divided by its probability, so the mean stays the same.
 
-Plain resampling would throw the stratification of the candidates away and make most scenes worse. Along a Hilbert
-curve through their positions and normals neighbours stand for each other, and it survives (Gerber, Chopin and
+Plain resampling would lose the stratification of the candidates and make most scenes worse. Along a Hilbert curve
+through their positions and normals, neighbours replace each other and the stratification survives (Gerber, Chopin and
 Whiteley 2019, "Negative association, ordering and convergence of resampling methods").
 
-Of candidates of several bounces all take part in one draw: a VPL of any bounce is kept for what it does to the image.
+Candidates of all bounces take part in one draw: a VPL of any bounce is chosen for its effect on the image.
 
 Sources: Segovia et al. 2006 (VPLs by their effect on the camera), Georgiev and Slusallek 2010 (probabilities from a
 few pixels, mixed with even ones).
@@ -36,11 +36,11 @@ from deferred_ir.vpls.ray_sum import ScaledSurfaces, ScaledVpls
 PROBES = 128
 """Pixels at which effects are estimated."""
 TRIES = 1024
-"""Camera rays cast to find them: some may meet nothing."""
+"""Camera rays cast to find them: some may hit nothing."""
 EVEN = 0.6
-"""Share of the probability that all candidates have alike: no VPL becomes brighter than 1/EVEN times a plain one."""
+"""Fraction of the probability that is even: so no VPL becomes brighter than 1/EVEN times an unweighted one."""
 PAIRS = 1 << 15
-"""Pairs of pixel and candidate in a task: their arrays stay in a core's cache, and its rays in one thread."""
+"""Pairs of pixel and candidate in a task: few enough for arrays to stay in a core's cache and rays in one thread."""
 BITS = 10
 """Bits a coordinate on the curve."""
 
@@ -69,8 +69,8 @@ def estimate_effects(tracer: Tracer, seen: Hits, vpls: Vpls, limits: VplLimits, 
     def work(surfaces: ScaledSurfaces) -> Array:
         added = surfaces.weigh_pairs(scaled) * power
         total = added.sum(axis=1, keepdims=True)
-        share = np.divide(added, total, out=added, where=total > 0)
-        squares: Array = np.einsum("ij,ij->j", share, share)
+        effect = np.divide(added, total, out=added, where=total > 0)
+        squares: Array = np.einsum("ij,ij->j", effect, effect)
         return squares
 
     squares = np.zeros(len(vpls))
@@ -81,26 +81,26 @@ def estimate_effects(tracer: Tracer, seen: Hits, vpls: Vpls, limits: VplLimits, 
 
 
 def resample(vpls: Vpls, effect: Array, count: int, seed: int = 0) -> Vpls:
-    """About `count` of `vpls` (n), as bright on average as all, in the curve's order; all if there are no more.
+    """Draw about `count` of `vpls` (n), in the curve's order, as bright on average as all; all if there are no more.
 
-    effect: float64 (n,). Where it is 0 everywhere, probabilities are even. One that is drawn twice is one VPL of
-    twice the power, so that there may be fewer than `count`.
+    effect: float64 (n,); where all are 0, probabilities are even. A candidate drawn twice becomes one VPL of twice the
+    power, so there may be fewer than `count`.
     """
     if len(vpls) <= count:
         return vpls
     even = np.full(len(vpls), 1 / len(vpls))
     total = effect.sum()
     probability = EVEN * even + (1 - EVEN) * effect / total if total > 0 else even
-    order = hilbert_order(_places(vpls), BITS)
+    order = hilbert_order(_cube_points(vpls), BITS)
     drawn = systematic(probability[order], count, streams.resampling(seed).random())
     drawn, times = np.unique(drawn, return_counts=True)
-    kept = order[drawn]
-    gain = times * probability.sum() / (count * probability[kept])
-    return Vpls(vpls.position[kept], vpls.normal[kept], vpls.emission[kept] * gain[:, None], vpls.ray[kept])
+    chosen = order[drawn]
+    gain = times * probability.sum() / (count * probability[chosen])
+    return Vpls(vpls.position[chosen], vpls.normal[chosen], vpls.emission[chosen] * gain[:, None], vpls.ray[chosen])
 
 
-def _places(vpls: Vpls) -> Array:
-    """Positions and normals in a unit cube, (n, 6): opposite normals are half of its edge apart."""
+def _cube_points(vpls: Vpls) -> Array:
+    """Return positions and normals in a unit cube, (n, 6); opposite normals are half of its edge apart."""
     low = vpls.position.min(axis=0)
     extent = max((vpls.position - low).max(), np.finfo(float).tiny)
     return np.column_stack([(vpls.position - low) / extent, (vpls.normal + 1) / 4])

@@ -172,6 +172,6 @@ def test_a_light_that_jumps_is_refilled_within_the_budget():
 
 def test_the_spotlights_own_version_changes_as_it_moves():
     state = IncrementalVpls(4)
-    first = state.spot_version(LIGHT)
-    assert state.spot_version(replace(LIGHT, emission=(1.0, 1.0, 1.0))) == first
-    assert len({first, *(state.spot_version(replace(LIGHT, fov=fov)) for fov in (10.0, 20.0))}) == 3
+    first = state.find_spot_version(LIGHT)
+    assert state.find_spot_version(replace(LIGHT, emission=(1.0, 1.0, 1.0))) == first
+    assert len({first, *(state.find_spot_version(replace(LIGHT, fov=fov)) for fov in (10.0, 20.0))}) == 3

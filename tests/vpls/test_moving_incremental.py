@@ -64,7 +64,7 @@ def test_what_holds_in_every_frame(steps, budget, seed):
             own = stays & (group == 1 + number)
             expected = transform_points(position[own], now @ np.linalg.inv(then))
             np.testing.assert_allclose(one.position[own], expected, atol=1e-12)
-        assert (one._lag()[one.used] <= FARTHEST * geometry.diagonal).all()
+        assert (one._measure_lag()[one.used] <= FARTHEST * geometry.diagonal).all()
         where, normal = one.position[vpls.ray], one.normal[vpls.ray]
         origins = np.broadcast_to(np.array(LIGHT.position), where.shape)
         way = where - origins
@@ -77,7 +77,7 @@ def test_what_holds_in_every_frame(steps, budget, seed):
         # Every map that misses something is known to.
         if step:
             for where in (before.boxes[step[0]], geometry.boxes[step[0]]):
-                off = (corners(where)[None] - one.shown[:, None]) @ one.shown_normal[:, :, None]
+                off = (corners(where)[None] - one.shaded_position[:, None]) @ one.shaded_normal[:, :, None]
                 seen_since |= (off[..., 0] > 1e-9).any(axis=1) & (not np.array_equal(before.poses, geometry.poses))
         seen_since &= ~drawn
         missing = np.isin(np.arange(48), vpls.ray) & seen_since
@@ -121,17 +121,17 @@ def test_maps_that_do_most_harm_come_first():
     maps.age(np.array([True, True, True, False]), np.array([False, False, True, False]), where)
     assert maps.stale.tolist() == [True, True, True, False]
     # The light that went along before the one nearby, that before one far off, and a strong one before all.
-    assert maps.worst(np.ones(4), 8).tolist() == [2, 0, 1]
-    assert maps.worst(np.ones(4), 1).tolist() == [2]
-    assert maps.worst(np.array([1.0, 1e3, 1.0, 1.0]), 2).tolist() == [1, 2]
+    assert maps.find_worst(np.ones(4), 8).tolist() == [2, 0, 1]
+    assert maps.find_worst(np.ones(4), 1).tolist() == [2]
+    assert maps.find_worst(np.array([1.0, 1e3, 1.0, 1.0]), 2).tolist() == [1, 2]
     # What is drawn is right again, and what stays wrong adds up: none is passed over for ever.
-    maps.drawn(np.array([2, 0]))
-    assert maps.worst(np.ones(4), 8).tolist() == [1]
+    maps.mark_drawn(np.array([2, 0]))
+    assert maps.find_worst(np.ones(4), 8).tolist() == [1]
     maps.follow(scene.at(0.2).geometry)
     for _ in range(40):
         maps.age(np.array([True, True, False, False]), np.zeros(4, bool), where)
-        first = maps.worst(np.ones(4), 1)
-        maps.drawn(first)
+        first = maps.find_worst(np.ones(4), 1)
+        maps.mark_drawn(first)
         if first[0] == 1:
             break
     assert first.tolist() == [1]
@@ -144,20 +144,20 @@ def test_lights_that_a_model_moves_behind_do_not_notice():
     scene = build(WALLS, box((-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)), motions=(None, shade), spotlight=light)
     tracer, state = Tracer(scene.at(0.0)), IncrementalVpls(16)
     state.update(light, tracer, least=0, most=16)
-    spot, before = state.spot_version(light), state.version.copy()
+    spot, before = state.find_spot_version(light), state.version.copy()
     tracer.follow(scene.at(0.5))
     state.update(light, tracer, least=0, most=16)
-    assert state.spot_version(light) == spot
+    assert state.find_spot_version(light) == spot
     assert (state.version != before).all()
     # Below the floor, behind the VPLs and before the light: the other way round.
     deep = replace(shade, translations=((0.0, -3.0, 0.0), (0.2, -3.0, 0.0)))
     scene = build(WALLS, box((-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)), motions=(None, deep), spotlight=light)
     tracer, state = Tracer(scene.at(0.0)), IncrementalVpls(16)
     state.update(light, tracer, least=0, most=16)
-    spot, before = state.spot_version(light), state.version.copy()
+    spot, before = state.find_spot_version(light), state.version.copy()
     tracer.follow(scene.at(0.5))
     state.update(light, tracer, least=0, most=16)
-    assert state.spot_version(light) != spot
+    assert state.find_spot_version(light) != spot
     assert (state.version == before).all()
 
 
@@ -188,9 +188,9 @@ def test_vpls_go_with_their_model_and_shine_from_where_their_maps_are():
         drawn = (state.version != before) & state.used
         assert drawn.sum() <= 8
         assert (drawn & used & (state._group == 1)).sum() >= 1  # new ones do not take the whole budget
-        np.testing.assert_array_equal(vpls.position, state.shown[vpls.ray])
-        assert state._lag().max() <= 0.02 * own.sum() / 2 + 1e-9
-    assert state._lag().max() > 0.05
+        np.testing.assert_array_equal(vpls.position, state.shaded_position[vpls.ray])
+        assert state._measure_lag().max() <= 0.02 * own.sum() / 2 + 1e-9
+    assert state._measure_lag().max() > 0.05
     assert state.used.sum() > 56
     for _ in range(40):
         vpls = state.update(light, tracer, least=4, most=8)

@@ -1,1 +1,1 @@
-"""Ray-traced truth, and how far an image is from it."""
+"""Ray-traced references, and the distance of images from them."""

@@ -1,8 +1,8 @@
-"""HDR-FLIP, the difference that a viewer sees, by the optional package flip-evaluator.
+"""Measure HDR-FLIP, the difference that a viewer sees, with the optional package flip-evaluator.
 
-The package is called with care: it ends the whole process where it finds no exposures of its own (a reference that is
-black, or nearly), ends Python on arguments that it dislikes, returns 0 for a single exposure and hides what is not
-finite. So exposures are always given, and images arrive scaled to a range that its 32-bit floats hold.
+The package needs care: it ends the whole process if it finds no exposures (for a reference that is black, or nearly),
+raises SystemExit on arguments that it refuses, returns 0 for a single exposure and hides values that are not finite. So
+exposures are always passed, and images are scaled to a range that its 32-bit floats hold.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from deferred_ir.base.errors import SettingError
 PIXELS_PER_DEGREE = 3840 * math.pi / 180
 """FLIP's own choice: a 0.7 m wide screen of 3840 pixels, seen from 0.7 m."""
 ACES = ((0.9036, 0.018, 0.0), (0.8748, 0.354, 0.14))
-"""The tone curve that FLIP exposes with, numerator and denominator by falling powers."""
+"""The tone curve that FLIP applies: numerator and denominator, by falling powers."""
 BRIGHT = 0.85
-"""The brightest pixel at the start exposure, and the median one at the stop exposure, come out of ACES like this."""
+"""ACES' output for the brightest pixel at the start exposure, and for the median pixel at the stop exposure."""
 STOPS = 60
-"""Far beyond white: brighter pixels are cut off here, so that no exposure makes them infinite."""
+"""Stops beyond white at which brighter pixels are clamped, so that no exposure makes them infinite."""
 WIDEST = 40
-"""Stops between the exposures: more than any display shows, and 20 below the cut, so that white stays white."""
+"""Most stops between the exposures: more than any display shows, and 20 below STOPS, so that white stays white."""
 
 
 @dataclass(frozen=True)
 class FlipParameters:
-    """What a FLIP value depends on besides the images: exposures in stops, how many of them, and the viewer."""
+    """Parameters of FLIP: first and last exposure in stops, the number of exposures, and the viewing conditions."""
 
     start_exposure: float
     stop_exposure: float
@@ -45,11 +45,11 @@ class FlipParameters:
             raise SettingError(f"FLIP: {self}: wants 0 to {WIDEST} stops from start to stop, and 2 exposures at least")
 
     @classmethod
-    def of(cls, reference: Array) -> FlipParameters:
-        """From the reference (H, W, 3) alone, by the rule of HDR-FLIP; use them for all images that are held to it.
+    def from_reference(cls, reference: Array) -> FlipParameters:
+        """Choose exposures for a reference (H, W, 3) by the rule of HDR-FLIP; use them for all images compared with it.
 
-        Only pixels above 0 make up the median: with a black background for median there would be no last exposure.
-        Of an even number it is the upper one, as flip-evaluator has it.
+        The median is that of the pixels above 0, since a black median would leave no last exposure; of an even number
+        it is the upper one, as in flip-evaluator. Raises SettingError if the reference is black.
         """
         luminance = np.asarray(reference, np.float64) @ LUMINANCE
         lit = np.sort(luminance[luminance > 0])
@@ -62,8 +62,8 @@ class FlipParameters:
         return cls(start, stop, max(2, math.ceil(stop - start)))
 
 
-def obstacle(image: Array, reference: Array, names: tuple[str, str]) -> str | None:
-    """Why FLIP cannot be had of these two, or None if it can. `names` are what the text calls them."""
+def find_obstacle(image: Array, reference: Array, names: tuple[str, str]) -> str | None:
+    """Return why FLIP cannot be measured on these two images, which the text calls `names`, or None if it can."""
     for array, name in zip((image, reference), names, strict=True):
         below = int((array < 0).any(-1).sum())
         if below:
@@ -76,10 +76,10 @@ def obstacle(image: Array, reference: Array, names: tuple[str, str]) -> str | No
     return None
 
 
-def mean_flip(image: Array, reference: Array, parameters: FlipParameters) -> float:
-    """The mean of HDR-FLIP's map over the whole picture, background included: 0 is alike, 1 is as unlike as can be.
+def measure_flip(image: Array, reference: Array, parameters: FlipParameters) -> float:
+    """Return the mean of HDR-FLIP's map over the whole picture, background included: 0 for equal images, 1 at most.
 
-    Both images: (H, W, 3), finite, at least 0, of one size.
+    Both images are (H, W, 3), finite, at least 0 and of the same size.
     """
     import flip_evaluator
 
@@ -91,7 +91,7 @@ def mean_flip(image: Array, reference: Array, parameters: FlipParameters) -> flo
         "numExposures": parameters.exposures,
         "tonemapper": parameters.tonemapper,
     }
-    exposed = (_exposed(array, parameters.start_exposure, 2.0 ** (STOPS - span)) for array in (reference, image))
+    exposed = (_expose(array, parameters.start_exposure, 2.0 ** (STOPS - span)) for array in (reference, image))
     try:
         _, mean, _ = flip_evaluator.evaluate(*exposed, "HDR", applyMagma=False, parameters=options)
     except SystemExit as end:
@@ -99,7 +99,7 @@ def mean_flip(image: Array, reference: Array, parameters: FlipParameters) -> flo
     return float(mean)
 
 
-def _exposed(image: Array, stops: float, white: float) -> Any:
-    """`image` at an exposure, in the layout that flip-evaluator reads."""
+def _expose(image: Array, stops: float, white: float) -> Any:
+    """Return `image` at an exposure, clamped to `white`, in the layout that flip-evaluator reads."""
     exposed = np.asarray(image, np.float64) * 2.0**stops
     return np.ascontiguousarray(np.minimum(exposed, white), np.float32)

@@ -1,16 +1,16 @@
-"""How far an image is from its reference: relMSE, RMSE, bias and FLIP, all on linear radiance.
+"""Measure the distance of an image from its reference: relMSE, RMSE, bias and FLIP, all on linear radiance.
 
-An image is a float array (H, W, 3). Every function refuses, with a SettingError that names the image, what cannot be
-measured: other shapes, sizes that differ, a reference without light, and values that are not finite, which an average
+An image is a float array (H, W, 3). Every function raises a SettingError that names the image where nothing can be
+measured: other shapes, different sizes, a reference without light, and values that are not finite, which an average
 would either spread or hide.
 
-Errors are averaged over the pixels in which the camera ray hits a surface. `hit` says which those are:
+Errors are averaged over the pixels in which the camera ray hits a surface. `hit` tells which pixels these are:
 
 * a bool array (H, W): exactly these pixels;
-* a number in (0, 1], the fraction of the pixels that are hit: enough, because the background is black in both images
-  and adds nothing to a sum. If more pixels than that are lit, all lit pixels count;
-* None: the lit pixels, which are those that are not 0 in all channels of both images. A surface that no light reaches
-  in either image then passes for background, so in a scene where such surfaces cover much the others weigh more.
+* a number in (0, 1]: the fraction of the pixels that are hit. This is enough, because the background is black in both
+  images and adds nothing to a sum. If more pixels than that are lit, all lit pixels count;
+* None: the lit pixels, which are not 0 in all channels of both images. A surface that no light reaches in either image
+  then counts as background, so the other surfaces weigh more.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ from deferred_ir.truth.flip import FlipParameters
 EPSILON = 0.01
 """relMSE adds this times mean(R)^2 to R^2, so that dark pixels do not decide alone."""
 TRIMMED = 0.001
-"""The part of the pixels, the worst ones, that trimmed relMSE leaves out."""
+"""Fraction of the pixels, the worst ones, that trimmed relMSE leaves out."""
 DARKEST = float(np.finfo(np.float32).tiny)
+"""Mean radiance of a reference below which it counts as black."""
 NAMES = ("image", "reference")
 
 Hit = Bools | float | None
@@ -38,11 +39,10 @@ Hit = Bools | float | None
 
 @dataclass(frozen=True)
 class Comparison:
-    """All figures of one comparison.
+    """All figures of a comparison. Means are over the pixels that count, and over RGB.
 
-    flip is None where FLIP could not be had; flip_note then says why. size: (width, height). pixels: how many count.
-    pixels_by: `mask`, `hit fraction` or `lit`, how that was known. trimmed_pixels: how many the trimmed relMSE leaves
-    out. Means are over the pixels that count, and RGB.
+    flip: None if FLIP could not be measured; flip_note then says why. size: (width, height). pixels: how many count.
+    pixels_by: `mask`, `hit fraction` or `lit`, which told how many. trimmed_pixels: how many trimmed relMSE leaves out.
     """
 
     relmse: float
@@ -60,13 +60,13 @@ class Comparison:
     reference_mean: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
+        """Return plain data for JSON."""
         return {**asdict(self), "size": list(self.size)}
 
 
 @dataclass(frozen=True, eq=False)
 class _Pair:
-    """Two images that can be compared, in double precision. `count`: the pixels that an average is over."""
+    """Two comparable images in double precision. count: the number of pixels that an average is over."""
 
     image: Array
     reference: Array
@@ -76,24 +76,24 @@ class _Pair:
 
     @property
     def mean(self) -> float:
-        """Of the reference."""
+        """The mean radiance of the reference."""
         return float(self.reference[self.mask].sum() / (3 * self.count))
 
     @property
-    def kept(self) -> int:
-        """How many pixels the trimmed relMSE keeps."""
+    def best(self) -> int:
+        """How many pixels, the best ones, trimmed relMSE is over."""
         return max(1, int(self.count * (1 - TRIMMED)))
 
     def errors(self) -> Array:
-        """(H, W): squared relative errors, averaged over RGB; 0 outside the mask."""
+        """Return squared relative errors, averaged over RGB, (H, W); 0 outside the mask."""
         with_epsilon = self.reference**2 + EPSILON * self.mean**2
         errors: Array = ((self.image - self.reference) ** 2 / with_epsilon).mean(-1)
         return np.where(self.mask, errors, 0.0)
 
     def relmse(self) -> tuple[float, float]:
         errors = np.sort(self.errors(), axis=None)
-        best = errors[: errors.size - (self.count - self.kept)]
-        return float(best.sum() / self.kept), float(errors.sum() / self.count)
+        trimmed = errors[: errors.size - (self.count - self.best)]
+        return float(trimmed.sum() / self.best), float(errors.sum() / self.count)
 
     def rmse(self) -> float:
         squares = (self.image - self.reference)[self.mask] ** 2
@@ -111,17 +111,17 @@ def compare(
     names: tuple[str, str] = NAMES,
     flip_parameters: FlipParameters | None = None,
 ) -> Comparison:
-    """All figures. `names` are what messages call the two.
+    """Measure all figures. `names` are what messages call the two images.
 
-    Give all images of a sweep the same `flip_parameters`, FlipParameters.of(reference); that is the default too.
+    Pass the same `flip_parameters` for all images of a sweep; the default is FlipParameters.from_reference(reference).
     """
-    pair = _pair(image, reference, hit, names)
+    pair = _make_pair(image, reference, hit, names)
     trimmed, untrimmed = pair.relmse()
-    note = flip.obstacle(pair.image, pair.reference, names)
+    note = flip.find_obstacle(pair.image, pair.reference, names)
     value = None
     if note is None:
-        flip_parameters = flip_parameters or FlipParameters.of(pair.reference)
-        value = flip.mean_flip(pair.image, pair.reference, flip_parameters)
+        flip_parameters = flip_parameters or FlipParameters.from_reference(pair.reference)
+        value = flip.measure_flip(pair.image, pair.reference, flip_parameters)
     height, width, _ = pair.image.shape
     return Comparison(
         relmse=trimmed,
@@ -134,50 +134,50 @@ def compare(
         size=(width, height),
         pixels=pair.count,
         pixels_by=pair.counted_by,
-        trimmed_pixels=pair.count - pair.kept,
+        trimmed_pixels=pair.count - pair.best,
         image_mean=float(pair.image[pair.mask].sum() / (3 * pair.count)),
         reference_mean=pair.mean,
     )
 
 
 def relmse(image: Any, reference: Any, hit: Hit = None) -> tuple[float, float]:
-    """relMSE, trimmed of the worst 0.1 % of the pixels (one pixel at least is kept), and untrimmed."""
-    return _pair(image, reference, hit, NAMES).relmse()
+    """Return relMSE without the worst 0.1 % of the pixels (but with one at least), and relMSE of all."""
+    return _make_pair(image, reference, hit, NAMES).relmse()
 
 
-def masked_relmse(image: Any, reference: Any, kept: Bools) -> float | None:
-    """relMSE of the pixels `kept`, bool (H, W), as if there were no others: they give mean(R), and 0.1 % of them go.
+def masked_relmse(image: Any, reference: Any, mask: Bools) -> float | None:
+    """Return trimmed relMSE of the pixels in `mask`, bool (H, W), mean(R) included, as if there were no others.
 
-    None where nothing is kept, or nothing of it is lit in the reference.
+    None if the mask is empty or the reference is black in it.
     """
-    if not np.asarray(reference)[kept].any():
+    if not np.asarray(reference)[mask].any():
         return None
-    return relmse(image, reference, kept)[0]
+    return relmse(image, reference, mask)[0]
 
 
 def rmse(image: Any, reference: Any, hit: Hit = None) -> float:
-    """Root of the mean of (I - R)^2, in units of radiance."""
-    return _pair(image, reference, hit, NAMES).rmse()
+    """Return the root of the mean of (I - R)^2, in units of radiance."""
+    return _make_pair(image, reference, hit, NAMES).rmse()
 
 
 def bias(image: Any, reference: Any, hit: Hit = None) -> float:
-    """mean(I - R) / mean(R): -0.1 means that a tenth of the light is missing."""
-    return _pair(image, reference, hit, NAMES).bias()
+    """Return mean(I - R) / mean(R): -0.1 means that a tenth of the light is missing."""
+    return _make_pair(image, reference, hit, NAMES).bias()
 
 
-def _pair(image: Any, reference: Any, hit: Hit, names: tuple[str, str]) -> _Pair:
+def _make_pair(image: Any, reference: Any, hit: Hit, names: tuple[str, str]) -> _Pair:
     first, second = check_radiance(image, names[0]), check_radiance(reference, names[1])
     if first.shape != second.shape:
         sizes = [f"{array.shape[1]}x{array.shape[0]}" for array in (first, second)]
         raise SettingError(f"{names[0]}: is {sizes[0]}, but {names[1]} is {sizes[1]}; render it at --size {sizes[1]}")
-    mask, count, counted_by = _counted(first, second, hit)
+    mask, count, counted_by = _count_pixels(first, second, hit)
     if second[mask].sum() < DARKEST * 3 * count or count == 0:
         raise SettingError(f"{names[1]}: is black; no error is relative to that")
     return _Pair(first, second, mask, count, counted_by)
 
 
-def _counted(image: Array, reference: Array, hit: Hit) -> tuple[Bools, int, str]:
-    """The pixels that errors are summed over, by how many their mean divides, and how that is known."""
+def _count_pixels(image: Array, reference: Array, hit: Hit) -> tuple[Bools, int, str]:
+    """Return the mask over which errors are summed, the number of pixels that counts, and what told that number."""
     everywhere = np.ones(image.shape[:2], np.bool_)
     lit = int(((image != 0) | (reference != 0)).any(-1).sum())
     if hit is None:

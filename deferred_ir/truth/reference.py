@@ -189,8 +189,8 @@ def _by_vpls(
     paths: PathTracer, size: tuple[int, int], params: Any, *, seed: int, threads: int | None, progress: Progress | None
 ) -> Reference:
     scene, tracer, bounces = paths.scene, paths.tracer, paths.bounces
-    seen = paths.seen(size)
-    direct = paths.direct(size, DISC_SAMPLES, seed, threads)
+    seen = paths.trace_camera_rays(size)
+    direct = paths.estimate_direct(size, DISC_SAMPLES, seed, threads)
     shines = bounces > 0 and any(scene.spotlight.emission)
     lights = cast(scene.spotlight, tracer, params.count, params.pattern, seed, bounces=bounces) if shines else NONE
     limits = params.limits(scene.geometry.diagonal)

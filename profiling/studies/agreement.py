@@ -41,7 +41,7 @@ def measure(scene: Scene, size: tuple[int, int], clamp: float, fov: float) -> di
     """Return the fraction of the lit blocks that agree, their number, and the ratio of the mean indirect light."""
     tracer = Tracer(scene)
     judge = PathTracer(scene, tracer, clamp=clamp, fov=fov)
-    seen, traced = judge.seen(size), judge.estimate(size, SPP, seed=7)
+    seen, traced = judge.trace_camera_rays(size), judge.estimate(size, SPP, seed=7)
     if traced.variance is None:
         raise ValueError(f"{SPP} paths a pixel are too few for a variance")
     limits, sums = VplLimits.from_angle(fov, clamp * scene.geometry.diagonal), []

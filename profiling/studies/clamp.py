@@ -38,7 +38,7 @@ def measure(scene: Scene, fov: float) -> dict[str, list[float]]:
     tracer = Tracer(scene)
     judge = PathTracer(scene, tracer)
     truth = judge.estimate(SIZE, SPP)
-    seen, reference = judge.seen(SIZE), truth.direct + truth.indirect
+    seen, reference = judge.trace_camera_rays(SIZE), truth.direct + truth.indirect
     errors = {str(count): [0.0] * len(CLAMPS) for count in COUNTS}
     with progress_bar(scene.name, len(COUNTS) * SEEDS * len(CLAMPS)) as bar:
         for count in COUNTS:

@@ -150,7 +150,7 @@ def _measured(
     sweep: Sweep, folder: Path, truth: Truth, mask: Mask, ahead: Sequence[tuple[str, int, int]]
 ) -> Iterator[Point]:
     """Measure and keep the points `ahead`, with a bar on a terminal."""
-    flip_parameters = FlipParameters.of(truth.radiance)
+    flip_parameters = FlipParameters.from_reference(truth.radiance)
     total = sum(vpls + OVERHEAD for _, vpls, _ in ahead)
     with progress_bar(total=total) as bar:
         for graph in dict.fromkeys(graph for graph, _, _ in ahead):
@@ -192,7 +192,7 @@ def _measure(
     if pictures:
         display, error = (points.path(folder, key.name, suffix) for suffix in points.PICTURES)
         image.save(display)
-        errors = error_picture.signed_error(image.radiance, truth.radiance, result.reference_mean)
+        errors = error_picture.measure_signed_errors(image.radiance, truth.radiance, result.reference_mean)
         error_picture.save(error, errors)
     memory, alive = renderer.memory(), measurement.counters[-1].get("vpls_alive", 0)
     left_out = savings.of_frames(renderer, plan, measurement)

@@ -51,7 +51,7 @@ def test_sub_buffers_hold_what_the_reference_finds_for_each_share(renderer, n, c
     found = read(one, ("light_shares", "shares"))[..., :3].reshape(-1, 3)
     residual = read(one, ("near_field", "residual"))[..., :3].reshape(-1, 3)
     tracer = one.tracer()
-    hits = PathTracer(scene, tracer).seen(SIZE)
+    hits = PathTracer(scene, tracer).trace_camera_rays(SIZE)
     pixel = np.arange(SIZE[0] * SIZE[1])
     hits = hits.rows((SIZE[1] - 1 - pixel // SIZE[0]) * SIZE[0] + pixel % SIZE[0])  # bottom row first
     vpls = cast(scene.spotlight, tracer, count, "sobol")
@@ -85,7 +85,7 @@ def test_thin_things_ask_the_missing_vpls(renderer):
     )
     image = known + asked
     assert asked.mean() > 0.9 * image.mean()
-    hits = PathTracer(scene, one.tracer()).seen(SIZE)
+    hits = PathTracer(scene, one.tracer()).trace_camera_rays(SIZE)
     expected = irradiance(one.tracer(), hits, cast(scene.spotlight, one.tracer(), 40, "sobol"), clamp=0.0)
     assert share_off(image, expected.reshape(image.shape), np.ones(image.shape[:2], bool)) < 0.01
 
@@ -115,7 +115,7 @@ def test_the_spotlight_is_right_pixel_by_pixel(renderer, scene, radius):
     scene = replace(scene, spotlight=replace(scene.spotlight, radius=radius))
     one = renderer(SIZE, "accurate", set=RAYS | {"shadow_rays.disc_samples": 64})
     found = one.render(scene, vpls=0, accumulate=4 if radius else 1).radiance
-    truth = PathTracer(scene, one.tracer()).direct(SIZE, 256)
+    truth = PathTracer(scene, one.tracer()).estimate_direct(SIZE, 256)
     lit = truth.mean(axis=2) > 0
     assert 0.05 < lit.mean() < 0.95
     assert rel_mse(found, truth, np.ones(lit.shape, bool), trim=1e-3) < (1e-3 if radius else 1e-7)

@@ -26,7 +26,7 @@ def soft(radius=0.3, scene=None):
 def lit(scene, *, seed=0, samples=4, block=4, threads=None):
     """Irradiance over emission and the truth of it, (H, W); rows as the path tracer has them."""
     tracer = Tracer(scene)
-    hits = PathTracer(scene, tracer).seen(SIZE)
+    hits = PathTracer(scene, tracer).trace_camera_rays(SIZE)
     rows = np.flatnonzero(hits.hit)
     seen = Surfaces(rows, *(getattr(hits, name)[rows] for name in ("position", "normal", "shading_normal")))
     return trace_spotlight(PixelJob(tracer, seen, SIZE, block, seed, threads), samples=samples)
@@ -34,8 +34,8 @@ def lit(scene, *, seed=0, samples=4, block=4, threads=None):
 
 def truth(scene, spp=256):
     tracer = Tracer(scene)
-    albedo = PathTracer(scene, tracer).seen(SIZE).albedo.reshape(SIZE[1], SIZE[0], 3)[..., 0]
-    radiance = PathTracer(scene, tracer).direct(SIZE, spp)[..., 0] / scene.spotlight.emission[0]
+    albedo = PathTracer(scene, tracer).trace_camera_rays(SIZE).albedo.reshape(SIZE[1], SIZE[0], 3)[..., 0]
+    radiance = PathTracer(scene, tracer).estimate_direct(SIZE, spp)[..., 0] / scene.spotlight.emission[0]
     return np.divide(radiance * np.pi, albedo, out=np.zeros_like(radiance), where=albedo > 0)
 
 
@@ -95,7 +95,7 @@ def test_no_light_on_the_background_beside_the_cone_or_behind():
     light = Spotlight((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), 30.0, (1.0, 1.0, 1.0), radius=0.05)
     ball = build(sphere(0.5), plane(0.6, -0.5), camera=Camera((0.0, 0.5, 3.0), (0.0, 0.0, 0.0)), spotlight=light)
     image = lit(ball)
-    hit = PathTracer(ball, Tracer(ball)).seen(SIZE).hit.reshape(SIZE[1], SIZE[0])
+    hit = PathTracer(ball, Tracer(ball)).trace_camera_rays(SIZE).hit.reshape(SIZE[1], SIZE[0])
     assert image[hit].max() > 0
     assert not image[~hit].any()
     tracer = Tracer(ball)

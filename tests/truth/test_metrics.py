@@ -172,7 +172,7 @@ def test_flip_is_what_its_package_says_of_an_image_without_black():
 
 def test_flip_keeps_its_exposures_where_most_of_the_reference_is_background():
     image, reference = pictures(shape=(64, 64))
-    parameters = FlipParameters.of(reference[:16])
+    parameters = FlipParameters.from_reference(reference[:16])
     image[16:] = reference[16:] = 0
     result = metrics.compare(image, reference)
     assert result.flip_parameters == parameters
@@ -190,7 +190,7 @@ def test_flip_takes_a_firefly_and_any_range_for_what_they_are():
     _, reference = pictures()
     firefly = reference.copy()
     firefly[5, 6] = 3e38
-    parameters = FlipParameters.of(reference)
+    parameters = FlipParameters.from_reference(reference)
     white = np.minimum(firefly, np.float32(1e6))
     flips = [metrics.compare(image, reference, flip_parameters=parameters).flip for image in (firefly, white)]
     assert 0 < flips[0] == pytest.approx(flips[1], abs=1e-6)
@@ -207,7 +207,7 @@ def test_exposures_that_would_hide_a_difference_are_refused(values):
 
 def test_no_exposure_shows_a_black_reference():
     with pytest.raises(SettingError, match="black"):
-        FlipParameters.of(np.zeros((4, 4, 3)))
+        FlipParameters.from_reference(np.zeros((4, 4, 3)))
 
 
 def test_the_flip_package_cannot_end_the_program(monkeypatch):
@@ -221,7 +221,7 @@ def test_the_flip_package_cannot_end_the_program(monkeypatch):
 
 def test_flip_sees_what_is_there_and_its_exposures_stay_fixed_in_a_sweep():
     image, reference = pictures(shape=(64, 64))
-    parameters = FlipParameters.of(reference)
+    parameters = FlipParameters.from_reference(reference)
     near = metrics.compare(0.5 * image + 0.5 * reference, reference, flip_parameters=parameters)
     far = metrics.compare(image, reference, flip_parameters=parameters)
     assert 0 < near.flip < far.flip < 1

@@ -86,7 +86,7 @@ def test_a_disc_light_is_the_mean_of_its_points():
     scene = build(plane(2.0), edge, camera=camera, spotlight=light)
     tracer = PathTracer(scene, Tracer(scene), bounces=0)
     estimate = tracer.estimate((16, 16), 2500, seed=3)
-    at = tracer.seen((16, 16)).position.reshape(16, 16, 3)
+    at = tracer.trace_camera_rays((16, 16)).position.reshape(16, 16, 3)
     on_floor = np.abs(at[..., 1]) < 1e-6
     # Concentric rings of equal area: midpoints in radius^2 and angle.
     steps = 64

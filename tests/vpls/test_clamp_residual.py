@@ -24,7 +24,7 @@ SIZE = (48, 32)
 
 def seen_by(scene, tracer, size=SIZE):
     """What the pixels of a frame show, top row first, and all their hits."""
-    hits = PathTracer(scene, tracer).seen(size)
+    hits = PathTracer(scene, tracer).trace_camera_rays(size)
     rows = np.flatnonzero(hits.hit)
     position, normal, smooth = (
         part[rows].astype(np.float32) for part in (hits.position, hits.normal, hits.shading_normal)

@@ -22,7 +22,7 @@ SIZE = (40, 30)
 def lit_scene(scene, count=45, fov=179.9):
     """A tracer, what the pixels see as `Surfaces` and `Hits`, the VPLs and their limits."""
     tracer = Tracer(scene)
-    hits = PathTracer(scene, tracer).seen(SIZE)
+    hits = PathTracer(scene, tracer).trace_camera_rays(SIZE)
     rows = np.flatnonzero(hits.hit)
     parts = (getattr(hits, name)[rows].astype(np.float32) for name in ("position", "normal", "shading_normal"))
     vpls = cast(scene.spotlight, tracer, count, "sobol")

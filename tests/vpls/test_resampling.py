@@ -40,7 +40,7 @@ def chosen(scene, count, seed, bounces=1, factor=16):
 
 def indirect(scene, vpls, size=(16, 12)):
     tracer = Tracer(scene)
-    seen = PathTracer(scene, tracer).seen(size)
+    seen = PathTracer(scene, tracer).trace_camera_rays(size)
     return sum_radiance(tracer, seen, vpls, limits(scene)).reshape(size[1], size[0], 3)
 
 
@@ -177,7 +177,7 @@ def test_probes_are_pixels_of_the_image_all_over_it():
     scene, tracer = room(), Tracer(room())
     seen = find_probes(tracer, scene.camera, (16, 8))
     assert len(seen.face) == PROBES
-    pixels = PathTracer(scene, tracer).seen((16, 8)).position
+    pixels = PathTracer(scene, tracer).trace_camera_rays((16, 8)).position
     nearest = np.linalg.norm(seen.position[:, None] - pixels, axis=2)
     assert nearest.min(axis=1).max() < 1e-5
     assert len(set(nearest.argmin(axis=1))) > 60  # of 128

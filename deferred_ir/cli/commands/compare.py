@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     result = compare(image.radiance, reference.radiance, hit, names=(str(image_path), str(reference_path)))
     print_notes(_list_notes(result, image, reference))
     if diff:
-        error = error_picture.signed_error(image.radiance, reference.radiance, result.reference_mean)
+        error = error_picture.measure_signed_errors(image.radiance, reference.radiance, result.reference_mean)
         error_picture.save(diff, error)
     if json:
         names = {"image": str(image_path), "reference": str(reference_path)}

@@ -1,0 +1,32 @@
+"""What authors of passes import, in one place; docs/adding-a-pass.md is the guide."""
+
+from __future__ import annotations
+
+from deferred_ir.base.errors import GraphError
+from deferred_ir.engine.unwritten_reads import unwritten_reads
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.fullscreen import FullscreenPass
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.facts import Fact, Facts
+from deferred_ir.graph.params import param
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
+from deferred_ir.report.plan_text import summary
+
+__all__ = [
+    "Buffer",
+    "Description",
+    "Fact",
+    "Facts",
+    "Frame",
+    "FullscreenPass",
+    "GraphError",
+    "Input",
+    "Io",
+    "Output",
+    "Pass",
+    "Texture",
+    "param",
+    "summary",
+    "unwritten_reads",
+]

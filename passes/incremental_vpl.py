@@ -15,13 +15,16 @@ from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_buffer import output, packed
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.frame.vpl_params import VplParams
+from deferred_ir.frame.vpl_params import VPLS_ALIVE, VplParams
 from deferred_ir.graph.facts import Facts, Statements
+from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Output
 from deferred_ir.vpls.cast import NONE
 from deferred_ir.vpls.incremental import IncrementalVpls
+
+VPLS_WAITING = Figure("vpls_waiting", "Rays for VPLs that no frame has cast yet.")
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,7 @@ class IncrementalVpl(Pass):
     """Keeps the VPLs that the spotlight still reaches, casts a few new ones and packs them for the shaders."""
 
     Params = Params
+    figures = (VPLS_ALIVE, VPLS_WAITING)
     State = State
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
@@ -62,6 +66,16 @@ class IncrementalVpl(Pass):
         """As many VPLs as there may be new ones in each."""
         count, most = int(self.params.count), int(self.params.most)
         return max(1, -(-count // max(most, 1)))
+
+    def explain_unfilled(self, name: str, figures: Mapping[str, int], averaged: int) -> str | None:
+        """Say how many VPLs there are so far, where the budget of a frame is less than all of them."""
+        count, frames, waiting = self.params.count, self.frames_to_fill(), figures.get(VPLS_WAITING.name, 0)
+        if averaged > 1:
+            few = f"each of the {averaged} frames that are averaged starts afresh, with few of {count} VPLs"
+            return f"{few}; --set {name}.most={count} gives them all" if frames > 1 else None
+        so_far = f"{count - waiting} of {count} rays for VPLs so far"
+        mend = f"{frames} frames fill the set where nothing moves, or --set {name}.most={count}"
+        return f"{so_far}: {mend}" if waiting else None
 
     def depends(self) -> frozenset[str]:
         """Where the light falls."""
@@ -83,8 +97,8 @@ class IncrementalVpl(Pass):
             io.repeat()
         versions = np.append(all_vpls.find_spot_version(light), all_vpls.version[vpls.ray])
         lights.write(packed(frame.scene, vpls, p, vpls.ray), versions)
-        io.report("vpls_alive", len(vpls))
-        io.report("vpls_waiting", all_vpls.waiting)
+        io.report(VPLS_ALIVE.name, len(vpls))
+        io.report(VPLS_WAITING.name, all_vpls.waiting)
 
 
 PASS = IncrementalVpl

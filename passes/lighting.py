@@ -16,15 +16,23 @@ from deferred_ir.frame.light_culling import last_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.screen_tiles import FEWEST, Tiles, draws
 from deferred_ir.gl.shaders import Program
+from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 from deferred_ir.shadows import shader_variants
 
+LIGHTS_SKIPPED = Figure(
+    "lights_skipped",
+    "Pairs of a screen tile and a light that were not shaded.",
+    left_out=("{n} pairs of tile and light", "the tile of the screen lies behind the light, or outside its cone"),
+)
+
 
 class Lighting(Pass):
     """Reflected radiance rho/pi * sum of I(w) cos V / d^2, linear RGB."""
 
+    figures = (LIGHTS_SKIPPED,)
     inputs: ClassVar[Mapping[str, Input]] = {
         "lights": Input("the spotlight, then the VPLs", format="light"),
         "depth": Input("reversed depth", format="depth32f"),
@@ -87,7 +95,7 @@ class Lighting(Pass):
                 io.gpu.ctx.enable(io.gpu.ctx.BLEND)
             program.set(first=draw.first, count=draw.count)
             program.draw_fullscreen()
-        io.count("lights_skipped", len(tiles.rectangles) * (len(records) - 1) - sum(d.count - d.first for d in made))
+        io.count(LIGHTS_SKIPPED.name, len(tiles.rectangles) * (len(records) - 1) - sum(d.count - d.first for d in made))
 
 
 PASS = Lighting

@@ -20,7 +20,7 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
-from deferred_ir.shadows import mesh_choice, paraboloid
+from deferred_ir.shadows import figures, mesh_choice, paraboloid
 from deferred_ir.shadows.atlas_cache import AtlasCache
 from deferred_ir.shadows.settings import MapParams
 
@@ -29,6 +29,7 @@ class ShadowMaps(Pass):
     """Depth as each light sees it."""
 
     Params = MapParams
+    figures = figures.ALL
     State = AtlasCache
     inputs: ClassVar[Mapping[str, Input]] = {
         "lights": Input("the lights to draw maps for", format="light"),
@@ -100,7 +101,7 @@ class ShadowMaps(Pass):
                 if (drawn & curved).any():
                     paraboloid.draw(mesh, io, self.params, records, drawn & curved, layered=True)
         io.state.remember()
-        io.count("maps_drawn", int(maps.dirty.sum()))
+        io.count(figures.MAPS_DRAWN.name, int(maps.dirty.sum()))
         if total > 1:
             mesh_choice.count(frame, io, self.params)
 

@@ -18,7 +18,7 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
-from deferred_ir.shadows import mesh_choice, paraboloid
+from deferred_ir.shadows import figures, mesh_choice, paraboloid
 from deferred_ir.shadows.settings import MapParams
 
 
@@ -26,6 +26,7 @@ class PlainMaps(Pass):
     """A depth map for each light."""
 
     Params = MapParams
+    figures = figures.ALL
     inputs: ClassVar[Mapping[str, Input]] = {"lights": Input("the lights to draw maps for", format="light")}
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
@@ -75,7 +76,7 @@ class PlainMaps(Pass):
                     frame.buffers.draw(program)
                 else:
                     mesh.draw_all(program, lights.records[i : i + 1])
-        io.count("maps_drawn", len(drawn))
+        io.count(figures.MAPS_DRAWN.name, len(drawn))
         if drawn.any():
             mesh_choice.count(frame, io, self.params)
 

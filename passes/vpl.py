@@ -12,14 +12,21 @@ from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_buffer import MapVersions, output, packed
 from deferred_ir.frame.light_culling import dropped, shining
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.frame.vpl_params import CastParams
+from deferred_ir.frame.vpl_params import VPLS_ALIVE, CastParams
 from deferred_ir.graph.facts import Facts, Statements
+from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Output
 from deferred_ir.sampling.patterns import warn_unbalanced
 from deferred_ir.vpls.cast import NONE, Vpls, cast
 from deferred_ir.vpls.resampling import estimate_effects, find_probes, resample
+
+LIGHTS_DROPPED = Figure(
+    "lights_dropped",
+    "VPLs whose map is not drawn.",
+    left_out=("maps of {n} lights", "they light nothing that is seen"),
+)
 
 
 @dataclass(frozen=True)
@@ -35,6 +42,7 @@ class Vpl(Pass):
     """Traces `count` rays from the spotlight, or more and chooses, and packs what they make for the shaders."""
 
     Params = Params
+    figures = (VPLS_ALIVE, LIGHTS_DROPPED)
     State = MapVersions
 
     def __init__(self, params: Any = None) -> None:
@@ -62,9 +70,9 @@ class Vpl(Pass):
         records, lights = packed(frame.scene, vpls, p, np.arange(len(vpls))), io["lights"]
         if frame.by_view and any(light.emission):
             records = dropped(records, frame.buffers.clusters, frame.scene.camera, frame.size)
-            io.count("lights_dropped", int((~shining(records)).sum()))
+            io.count(LIGHTS_DROPPED.name, int((~shining(records)).sum()))
         lights.write(records, io.state.update(records, frame.scene) if frame.reuse else None)
-        io.report("vpls_alive", len(vpls))
+        io.report(VPLS_ALIVE.name, len(vpls))
 
     def _cast(self, frame: Frame) -> Vpls:
         """The VPLs of a frame; with candidates, `count` of them, or more where further bounces bring more."""

@@ -8,6 +8,7 @@ from typing import Literal
 
 from deferred_ir.frame.facts import EMITS
 from deferred_ir.graph.facts import Fact, Facts, Statements
+from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.params import param
 from deferred_ir.sampling.patterns import Pattern
 from deferred_ir.vpls.kernel import VplLimits
@@ -18,6 +19,8 @@ SHARES = Fact("shares", unknown=1, doc="Interleaving factor: a pixel is shaded w
 CLAMP = Fact("clamp", unknown=0.0, doc="Distance below which VPLs' 1/d^2 is held, as a fraction of the diagonal.")
 CONE = Fact[float | None]("cone", unknown=None, doc="Opening angle of the cone that VPLs shine into, degrees.")
 CLAMP_RETURNED = Fact("clamp_returned", unknown=False, doc="Short rays add the light that the clamp takes from VPLs.")
+
+VPLS_ALIVE = Figure("vpls_alive", "VPLs that shine.", ("vpls_alive",))
 
 AUTO_CLAMP = 0.64
 """Clamp distance of one VPL in diagonals where short rays give back what it takes: best at 64 to 1024 VPLs of both a

@@ -20,6 +20,7 @@ from typing import Any
 from deferred_ir.base.errors import GraphError, did_you_mean, shown
 from deferred_ir.base.toml_tables import read_toml
 from deferred_ir.graph import former_names, params
+from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.graph import Graph, Node
 from deferred_ir.graph.pass_base import Pass
 
@@ -83,6 +84,13 @@ def graph_hash(graph: Graph) -> str:
     nodes = {n.name: [type(n.work).__name__, repr(n.work.params), dict(n.inputs)] for n in graph.nodes.values()}
     text = json.dumps([nodes, dict(graph.outputs)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def list_figures(graph: Graph) -> list[Figure]:
+    """List the figures of the passes that come with the package and of the graph's own."""
+    kinds = [importlib.import_module(f"{PASSES}.{kind}").PASS for kind in pass_types()]
+    kinds += [node.work for node in graph.nodes.values()]
+    return list(dict.fromkeys(figure for kind in kinds for figure in kind.figures))
 
 
 @cache

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from deferred_ir.graph.facts import Facts, Statements
+from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.params import NoParams
 from deferred_ir.graph.ports import Description, Input, Output
 
@@ -26,6 +27,8 @@ class Pass:
 
     A new one is made when the pass is new, one of its outputs is allocated anew, or all frames so far are forgotten.
     """
+    figures: ClassVar[Sequence[Figure]] = ()
+    """Figures that the pass publishes, and where RUN.json has them."""
     shader_folder: ClassVar[Path | None] = None
     """Folder of a user's shaders, searched before the package's own."""
 
@@ -64,6 +67,15 @@ class Pass:
     def frames_to_fill(self) -> int:
         """Return in how many frames of a still scene what the pass keeps from frame to frame becomes complete."""
         return 1
+
+    def explain_unfilled(self, name: str, figures: Mapping[str, int], averaged: int) -> str | None:
+        """Return what the last image lacks of what the pass completes over several frames, and the mend; else None.
+
+        name: the pass's name in the graph. figures: what was published with the last frame, by name. averaged: frames
+        in an image; each of several starts afresh.
+        """
+        del name, figures, averaged
+        return None
 
     def subpasses(self, inputs: Mapping[str, Description | None], state: Any = None) -> Sequence[Mapping[str, Any]]:
         """Return the sub-passes that the pass plans for itself, one dictionary each, for those who read the plan.

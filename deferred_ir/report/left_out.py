@@ -29,8 +29,8 @@ class LeftOut:
     bytes: int | None = None
 
 
-def of_scene(scene: Scene) -> list[LeftOut]:
-    """Attributes and the code that reads them, which this scene does not need."""
+def list_for_scene(scene: Scene) -> list[LeftOut]:
+    """List the vertex attributes, and the code that reads them, that this scene does not need."""
     g = scene.geometry
     vertices = len(g.positions)
     textured = {material.texture is not None for material in scene.materials}
@@ -45,18 +45,17 @@ def of_scene(scene: Scene) -> list[LeftOut]:
     return [entry for absent, entry in found if absent]
 
 
-def of_frames(renderer: Renderer, plan: Plan, measurement: Measurement) -> list[LeftOut]:
-    """What the frames that `measurement` tells of did without, as the device has it after the last of them."""
+def list_for_frames(renderer: Renderer, plan: Plan, measurement: Measurement) -> list[LeftOut]:
+    """List what the frames of `measurement` did without. It reads what the last of them has left on the device."""
     executor, frames, last = renderer.executor, len(measurement.skipped), measurement.counters[-1]
     found = [
         LeftOut(name, f"in {n} of {frames} frames nothing that it is made of changed", ms)
         for name, n, ms in measurement.skipped_passes()
     ]
-    if dropped := last.get("lights_dropped", 0):
-        found.append(LeftOut(f"maps of {dropped} lights", "they light nothing that is seen"))
-    if skipped := last.get("lights_skipped", 0):
-        why = "the tile of the screen lies behind the light, or outside its cone"
-        found.append(LeftOut(f"{skipped} pairs of tile and light", why))
+    for figure in dict.fromkeys(figure for step in plan.steps for figure in step.work.figures):
+        if figure.left_out and (n := last.get(figure.name, 0)):
+            what, why = (text.format(n=n) for text in figure.left_out)
+            found.append(LeftOut(what, why))
     if renderer.embree_seconds == 0:
         found.append(LeftOut("Embree's scene", "no ray was traced"))
     for step in plan.steps:
@@ -76,22 +75,24 @@ def of_frames(renderer: Renderer, plan: Plan, measurement: Measurement) -> list[
     return found
 
 
-def of_passes(renderer: Renderer, scene: Scene, plan: Plan, *, vpls: int | None = None, seed: int = 0) -> list[LeftOut]:
-    """Passes and targets that `plan` does without; those that another scene or output would need are run and measured.
+def measure_passes(
+    renderer: Renderer, scene: Scene, plan: Plan, *, vpls: int | None = None, seed: int = 0
+) -> list[LeftOut]:
+    """Measure the passes and targets that `plan` does without, by running those that another scene or output needs.
 
-    Call it when all frames are drawn and read: it draws into what they have left. Where they cannot run here, since
-    their maps would not fit for one, they stay without figures.
+    Call it when all frames are drawn and read: it draws into their textures. Those that cannot run here, for example
+    since their maps would not fit, are listed without figures.
     """
     ms, nbytes = dict[str, float](), dict[str, int]()
     if plan.left_out:
         with suppress(DeviceError, GraphError):
-            ms = _timed(renderer, scene, plan, vpls=vpls, seed=seed)
+            ms = _time_passes(renderer, scene, plan, vpls=vpls, seed=seed)
             nbytes = renderer.executor.allocation.nbytes()
     return [LeftOut(name, why, ms.get(name), nbytes.get(name)) for name, why in plan.left_out.items()]
 
 
-def _timed(renderer: Renderer, scene: Scene, plan: Plan, *, vpls: int | None, seed: int) -> dict[str, float]:
-    """GPU time of each pass that runs with `keep_all` and not in `plan`, ms."""
+def _time_passes(renderer: Renderer, scene: Scene, plan: Plan, *, vpls: int | None, seed: int) -> dict[str, float]:
+    """Measure each pass that runs with `keep_all` and not in `plan`. Returns GPU time in ms by name."""
     full = renderer.plan(scene, vpls, keep_all=True)
     extra = {step.name for step in full.steps} - {step.name for step in plan.steps}
     measurement, reuse, renderer.reuse = Measurement(), renderer.reuse, False

@@ -26,7 +26,7 @@ def summary(plan: Plan, scene: Scene | None = None) -> str:
     lines.append("outputs: " + ", ".join(f"{name} = {'.'.join(source)}" for name, source in plan.outputs.items()))
     lines += [f"left out: {name}: {why}" for name, why in plan.left_out.items()]
     if scene:
-        lines += [f"left out: {entry.what}: {entry.why}" for entry in left_out.of_scene(scene)]
+        lines += [f"left out: {entry.what}: {entry.why}" for entry in left_out.list_for_scene(scene)]
     return "\n".join(lines)
 
 

@@ -1,16 +1,18 @@
-"""RUN.json: what was rendered, on what, how long each pass took and what was left out."""
+"""RUN.json: what was rendered, on what, how long each pass took and what was left out. Describing draws nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from deferred_ir.engine.measurement import Measurement
-from deferred_ir.graph.file import graph_hash
+from deferred_ir.engine.settings import VPLS
+from deferred_ir.graph.figures import Figure
+from deferred_ir.graph.file import graph_hash, list_figures
 from deferred_ir.graph.graph import Graph, Plan
-from deferred_ir.report import left_out as savings
-from deferred_ir.report import lost_light
+from deferred_ir.graph.roles import find_parameters
+from deferred_ir.report.left_out import LeftOut, list_for_frames, list_for_scene
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.scene.scene import Scene
 
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
     from deferred_ir.engine.renderer import Renderer
 
 
-def run_record(
+def describe_run(
     renderer: Renderer,
     scene: Scene,
     graph_name: str,
@@ -29,20 +31,16 @@ def run_record(
     measurement: Measurement,
     accumulated: int = 1,
 ) -> dict[str, Any]:
-    """The record of a run as plain data, in the order of the contract. accumulated: frames averaged in an image."""
-    casting = graph.nodes.get("vpl")
-    last = measurement.counters[-1]
+    """Return what RUN.json holds, in the order of the contract, from what the frames have left on the device.
+
+    accumulated: frames averaged in an image. `add_measurements` adds what takes work of its own.
+    """
     passes: list[dict[str, Any]] = [dict(entry) for entry in measurement.passes()]
     for entry in passes:
         step = next((step for step in plan.steps if step.name == entry["name"]), None)
         if step and (subpasses := step.work.subpasses(step.descriptions, renderer.executor.state(step.name))):
             entry["subpasses"] = [dict(subpass) for subpass in subpasses]
-    memory = renderer.memory()
-    left_out = [*savings.of_scene(scene), *savings.of_frames(renderer, plan, measurement)]
-    lost = lost_light.estimate_for(plan, renderer.tracer)
-    # Last, for it draws over what the frames have left.
-    time = (len(measurement.frame_ms) - 1) / FRAMES_PER_SECOND if scene.moves else 0.0
-    left_out += savings.of_passes(renderer, scene.at(time), plan, seed=seed)
+    left_out = [*list_for_scene(scene), *list_for_frames(renderer, plan, measurement)]
     return {
         "scene": scene.name,
         "scene_hash": scene.hash,
@@ -50,24 +48,37 @@ def run_record(
         "graph": graph_name,
         "graph_hash": graph_hash(graph),
         "size": list(renderer.size),
-        "vpls": getattr(casting.work.params, "count", 0) if casting else 0,
-        "vpls_alive": last.get("vpls_alive", 0),
+        "vpls": max(find_parameters(graph, VPLS).values(), default=0),
         "seed": seed,
         "device": renderer.gpu.device.name,
         "frames": len(measurement.frame_ms),
-        "time": time,
+        "time": (len(measurement.frame_ms) - 1) / FRAMES_PER_SECOND if scene.moves else 0.0,
         "accumulated": accumulated,
         "frame_ms": measurement.median_frame_ms(),
         "passes": passes,
-        "maps_drawn": [counters.get("maps_drawn", 0) for counters in measurement.counters],
-        "stand_in": _stand_in(last),
+        **_read_figures(list_figures(graph), measurement.counters),
         "left_out": [asdict(entry) for entry in left_out],
-        "bias": lost,
-        "memory_bytes": memory,
+        "bias": None,
+        "memory_bytes": renderer.memory(),
     }
 
 
-def _stand_in(counters: Mapping[str, int]) -> dict[str, int] | None:
-    """Triangles and bytes of the mesh that maps of VPLs drew, None where it was the scene's own."""
-    names = ("triangles", "bytes")
-    return {name: counters[f"stand_in_{name}"] for name in names} if "stand_in_bytes" in counters else None
+def add_measurements(run: dict[str, Any], *, bias: Mapping[str, float] | None, passes: Sequence[LeftOut]) -> None:
+    """Add to a described run what was measured after its frames: lost light, and the passes that were left out."""
+    run["bias"] = None if bias is None else dict(bias)
+    run["left_out"] += [asdict(entry) for entry in passes]
+
+
+def _read_figures(figures: Sequence[Figure], frames: Sequence[Mapping[str, int]]) -> dict[str, Any]:
+    """Put the figures in their places in RUN.json. frames: what was published with each, by name."""
+    result: dict[str, Any] = {}
+    for figure in figures:
+        last = frames[-1].get(figure.name)
+        match figure.key:
+            case (key,):
+                result[key] = [frame.get(figure.name, 0) for frame in frames] if figure.each_frame else last or 0
+            case (table, key):
+                result.setdefault(table, None)
+                if last is not None:
+                    result[table] = {**(result[table] or {}), key: last}
+    return result

@@ -12,6 +12,7 @@ from deferred_ir.meshes import levels
 from deferred_ir.meshes.clusters import Clusters
 from deferred_ir.meshes.posed import MapMesh
 from deferred_ir.meshes.subdivide import subdivided
+from deferred_ir.shadows.figures import STAND_IN_BYTES, STAND_IN_TRIANGLES
 from deferred_ir.shadows.settings import MapParams
 
 
@@ -44,5 +45,5 @@ def count(frame: Frame, io: Io, params: MapParams) -> None:
     """Publish how large the mesh is that stands in for the scene, if one does."""
     mesh = of_vpls(frame, params)
     if mesh is not frame.buffers.cluster_buffers:
-        io.report("stand_in_triangles", int(mesh.clusters.sizes.sum()))
-        io.report("stand_in_bytes", mesh.mesh_bytes)
+        io.report(STAND_IN_TRIANGLES.name, int(mesh.clusters.sizes.sum()))
+        io.report(STAND_IN_BYTES.name, mesh.mesh_bytes)

@@ -195,8 +195,8 @@ def _measure(
         errors = error_picture.measure_signed_errors(image.radiance, truth.radiance, result.reference_mean)
         error_picture.save(error, errors)
     memory, alive = renderer.memory(), measurement.counters[-1].get("vpls_alive", 0)
-    left_out = savings.of_frames(renderer, plan, measurement)
-    left_out += savings.of_passes(renderer, sweep.moment, plan, vpls=key.vpls, seed=key.seed)
+    left_out = savings.list_for_frames(renderer, plan, measurement)
+    left_out += savings.measure_passes(renderer, sweep.moment, plan, vpls=key.vpls, seed=key.seed)
     point = Point(
         key=key,
         scene=scene.name,

@@ -17,7 +17,7 @@ from small_scenes import build, crooked_room, plane, room
 from deferred_ir.base.errors import GraphError
 from deferred_ir.engine.measurement import Measurement
 from deferred_ir.meshes.subdivide import subdivide
-from deferred_ir.report.run_json import run_record
+from deferred_ir.report.run_json import describe_run
 
 measurement = import_module("deferred_ir.profiling.studies.tessellation")
 visibility = import_module("deferred_ir.profiling.checks.visibility")
@@ -191,7 +191,7 @@ def test_the_mesh_is_told_of_where_there_is_one(renderer, graph, projection):
     before = one.memory()["buffers"]
     one.draw(scene, plan, measurement=measurement)
     one.finish(measurement)
-    told = run_record(one, scene, graph, one.graph(8), plan, seed=0, measurement=measurement)["stand_in"]
+    told = describe_run(one, scene, graph, one.graph(8), plan, seed=0, measurement=measurement)["stand_in"]
     if projection == "perspective":
         assert told is None
         return

@@ -28,7 +28,7 @@ def told(renderer, scene, graph, outputs=None, **settings):
         one.draw(scene, plan, measurement=measurement)
     one.finish(measurement)
     before = one.memory()
-    entries = savings.of_frames(one, plan, measurement) + savings.of_passes(one, scene, plan)
+    entries = savings.list_for_frames(one, plan, measurement) + savings.measure_passes(one, scene, plan)
     return {entry.what: entry for entry in entries}, one.memory()["textures"] - before["textures"]
 
 
@@ -63,7 +63,7 @@ def test_measuring_that_fails_leaves_the_renderer_as_it_was(renderer, monkeypatc
     one.draw(room(), plan)
     with monkeypatch.context() as full:
         full.setattr(one.executor, "run", partial(_refuse, DeviceError("no room")))
-        entries = savings.of_passes(one, room(), plan)
+        entries = savings.measure_passes(one, room(), plan)
     assert {entry.what: entry.ms for entry in entries}["tonemap"] is None
     assert one.reuse
 
@@ -103,7 +103,7 @@ def test_lights_layers_and_shared_textures_are_told(renderer):
 
 def test_the_scene_tells_what_shaders_do_without():
     def words(scene):
-        return {entry.what for entry in savings.of_scene(scene)}
+        return {entry.what for entry in savings.list_for_scene(scene)}
 
     assert words(room()) == {"vertex normals", "vertex colours", "textures", "soft shadows"}
     assert words(smooth_scene()) == {"vertex colours", "textures", "soft shadows"}

@@ -125,38 +125,27 @@ def _prepare_drawing(renderer: Renderer, scene: Scene, files: ImageFiles, argume
 def _describe_run(drawing: Drawing, arguments: argparse.Namespace, averaged: int) -> dict[str, Any]:
     """Collect what RUN.json holds; `averaged`: frames in the last image."""
     from deferred_ir.engine.settings import choose_graph
-    from deferred_ir.report.run_json import run_record
+    from deferred_ir.report.left_out import measure_passes
+    from deferred_ir.report.lost_light import estimate_for
+    from deferred_ir.report.run_json import add_measurements, describe_run
 
     renderer, scene, measurement = drawing.renderer, drawing.scene, drawing.measurement
     assert measurement is not None
     renderer.finish(measurement)
     graph = choose_graph(arguments.graph, scene.render)
-    return run_record(
-        renderer,
-        scene,
-        graph,
-        renderer.graph(),
-        drawing.plan,
-        seed=drawing.seed,
-        measurement=measurement,
-        accumulated=averaged,
+    plan, seed = drawing.plan, drawing.seed
+    run = describe_run(
+        renderer, scene, graph, renderer.graph(), plan, seed=seed, measurement=measurement, accumulated=averaged
     )
+    bias = estimate_for(plan, renderer.tracer)
+    # Last, for it draws over what the frames have left.
+    add_measurements(run, bias=bias, passes=measure_passes(renderer, scene.at(run["time"]), plan, seed=seed))
+    return run
 
 
 def _explain_unfilled(drawing: Drawing) -> Iterator[str]:
-    """Yield a note where a pass that renews VPLs over several frames had no budget for all of them."""
-    nodes = drawing.renderer.graph().nodes
-    count = getattr(nodes["vpl"].work.params, "count", 0) if "vpl" in nodes else 0
-    if drawing.accumulate > 1:
-        if drawing.plan.frames_to_fill > 1:
-            yield (
-                f"each of the {drawing.accumulate} frames that are averaged starts afresh, with few of {count} VPLs; "
-                f"--set vpl.most={count} gives them all"
-            )
-        return
-    waiting = drawing.renderer.executor.counters.get("vpls_waiting")
-    if waiting:
-        yield (
-            f"{count - waiting} of {count} rays for VPLs so far: {drawing.plan.frames_to_fill} frames fill "
-            f"the set where nothing moves, or --set vpl.most={count}"
-        )
+    """Yield a note for each pass that has not completed what it keeps from frame to frame."""
+    figures = drawing.renderer.executor.counters
+    for step in drawing.plan.steps:
+        if note := step.work.explain_unfilled(step.name, figures, drawing.accumulate):
+            yield note

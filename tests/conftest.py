@@ -95,10 +95,10 @@ def viewer_window(screen: str) -> Iterator[Any]:
     glfw.make_context_current(None)  # else contexts of other tests would never become current
     yield viewer
     with window:
-        viewer.panel.truth.start()
+        viewer.panel.reference.start()
         viewer.frame()
         viewer.close()
-    assert not viewer.panel.truth.truth.running
+    assert not viewer.panel.reference.job.running
     close_renderer()
 
 

@@ -1,4 +1,4 @@
-"""The window's life: take input, change the session, draw the picture and the controls over it."""
+"""Runs the window: takes input, changes the session, draws the picture and the controls over it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from deferred_ir.gl.window import Window
 from deferred_ir.output.image import Image
 from deferred_ir.viewer.canvas import Area, Canvas
 from deferred_ir.viewer.controls import Controls
-from deferred_ir.viewer.file_watch import Watch, is_graph
+from deferred_ir.viewer.file_watch import FileWatch, is_graph
 from deferred_ir.viewer.panels.side_panel import Panel
 from deferred_ir.viewer.session import Session
 
@@ -26,12 +26,12 @@ class Viewer:
         self.canvas = Canvas(window, session.renderer.gpu, session.renderer.executor.library)
         self.controls = Controls(window, session)
         self.panel = Panel(window, session, self.controls)
-        self.watch = Watch()
+        self.watch = FileWatch()
         self.frames = 0
         window.on_drop = self.drop
 
     def drop(self, paths: list[str]) -> None:
-        """Files dropped on the window: a scene or a model, or a graph file."""
+        """Open files that were dropped on the window: scenes, models and graph files."""
         for path in paths:
             if is_graph(path):
                 self.session.choose(path)
@@ -39,12 +39,12 @@ class Viewer:
                 self.session.open(path)
 
     def area(self) -> Area:
-        """Where in the window the picture is."""
+        """Return the part of the window that the picture fills."""
         width, height = self.window.size
         return Area(0, 0, max(width - self.panel.width, 1), max(height, 1))
 
     def frame(self, wait: float = 0.0) -> bool:
-        """One round; whether the picture has changed. Leaves the frame drawn but not yet on screen."""
+        """Do one round. Returns whether the picture has changed. The frame is drawn but not yet on screen."""
         with self.window:
             self.window.begin(wait)
             self.controls.take()
@@ -56,32 +56,34 @@ class Viewer:
                 self.session.resize((area.width, area.height))
                 changed = self.session.draw()
                 self.window.target()
-                self._picture(area)
+                self._show_picture(area)
                 self.panel.finish()
             self.window.end()
             self.frames += 1
         return changed
 
-    def _picture(self, area: Area) -> None:
+    def _show_picture(self, area: Area) -> None:
+        """Draw the picture, and what panels lay over it."""
         texture = self.session.output(self.session.plan.outputs["display"])
         if not isinstance(texture, GpuTexture):  # nothing was drawn so far
             return
-        self.canvas.show(texture, area.fitted(texture.size) if texture.size != (area.width, area.height) else area)
+        self.canvas.show(texture, area.fit(texture.size) if texture.size != (area.width, area.height) else area)
         self.panel.show(self.canvas, area)
 
     def _reload(self) -> None:
-        if self.watch.changed(self.session.graph, self.session.plan):
+        """Read graph and shaders again if one of their files has changed."""
+        if self.watch.look(self.session.graph, self.session.plan):
             self.session.change()
             if not self.session.error:
                 self.session.reload_shaders()
 
     def screenshot(self) -> Any:
-        """The window as it is, uint8 (H, W, 3)."""
+        """Read the window as it is, uint8 (H, W, 3), top row first."""
         with self.window:
             return self.window.pixels()
 
     def run(self, frames: int | None = None, screenshot: Path | None = None) -> None:
-        """Until the window is closed, or for `frames` frames; the last one goes to `screenshot`, too."""
+        """Run until the window is closed, or for `frames` frames; the last one is written to `screenshot`, too."""
         busy = True
         while not self.window.closing and (frames is None or self.frames < frames):
             changed = self.frame(0.0 if busy or frames is not None else IDLE)
@@ -92,7 +94,7 @@ class Viewer:
                 self.window.show()
 
     def close(self) -> None:
-        """End what runs, and give everything back."""
+        """End background work, release what is on the device and close the window."""
         with self.window:
             self.panel.close()
             self.session.close()

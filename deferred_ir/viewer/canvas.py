@@ -1,4 +1,4 @@
-"""Puts textures of the renderer on the window: the picture, the output of a pass, a shadow map in the corner."""
+"""Draws textures of the renderer into the window: the picture, the output of a pass, a shadow map in the corner."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Area:
     width: int
     height: int
 
-    def fitted(self, size: tuple[int, int]) -> Area:
-        """The largest rectangle of the shape of `size` in the middle of this one, one pixel at least."""
+    def fit(self, size: tuple[int, int]) -> Area:
+        """Return the largest rectangle with the aspect of `size` in the middle of this one, at least one pixel."""
         scale = min(self.width / size[0], self.height / size[1])
         width, height = max(round(size[0] * scale), 1), max(round(size[1] * scale), 1)
         return Area(self.x + (self.width - width) // 2, self.y + (self.height - height) // 2, width, height)
@@ -48,11 +48,12 @@ class Canvas:
         linear: bool = False,
         split: int = 0,
     ) -> None:
-        """Fill `area` with `part` of a texture (all of it unless given), nearest texels, no filter.
+        """Fill `area` with `part` of a texture, all of it by default, unfiltered.
 
-        gain: brightness of what is not a finished picture. linear: depth as distance. split: columns left out.
+        gain: brightness, except of finished pictures. linear: show depth as distance. split: columns at the left that
+        stay as they are.
         """
-        kind = _kind(texture)
+        kind = _choose_kind(texture)
         part = part or Area(0, 0, *texture.size)
         self._gpu.reset()
         self._window.viewport(area.x, area.y, area.width, area.height)
@@ -65,7 +66,8 @@ class Canvas:
         program.draw_fullscreen()
 
 
-def _kind(texture: GpuTexture) -> int:
+def _choose_kind(texture: GpuTexture) -> int:
+    """Return how show.frag turns texels into colours."""
     if texture.format.depth:
         return DEPTH
     if texture.format.dtype == "u4":

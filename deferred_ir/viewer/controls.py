@@ -1,45 +1,36 @@
-"""Keys and mouse: what they do, stated once in `KEYS` for the code and for the help in the panel."""
+"""Keys and mouse. `KEYS` is what they do, for the code, for the help in the panel and for docs/viewer.md."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from deferred_ir.gl.window import Window
+from deferred_ir.loading.load import builtin_scenes
 from deferred_ir.scene.camera import Camera
-from deferred_ir.viewer.navigation import as_camera, as_light, moved, turned
+from deferred_ir.viewer.navigation import as_camera, as_light, move, turn
 from deferred_ir.viewer.session import Session
 
-SCENES = ("cornell", "atrium", "colors")
-"""Keys 1, 2, 3."""
+FIRST = "cornell"
+"""The scene of key 1; the other built-in ones follow by name."""
+SCENES = sorted((name for name, _ in builtin_scenes()), key=lambda name: (name != FIRST, name))[:9]
 SPEED = 0.2
 """Diagonals of the scene a second."""
 SLOWEST = 0.1
 """Seconds that a slow frame counts at most, so that a step is never a leap."""
 TURN = 0.005
 """Radians a pixel of the mouse's way."""
+NOTCH = SPEED / 4
+"""Diagonals of the scene a notch of the wheel."""
 
-HELP = (
-    ("1 2 3", "scenes: " + ", ".join(SCENES)),
-    ("W A S D, Q E", "fly; down and up"),
-    ("left mouse button", "look around"),
-    ("wheel", "forward and back"),
-    ("arrows, page up/down", "move the light, as the camera sees it"),
-    ("right mouse button", "the same; with Shift it turns the light"),
-    ("L", "put the light at the camera"),
-    ("V", "see from the light; what flies now is the light"),
-    ("F", "draw light and VPLs as local frames"),
-    ("M", "the shadow map in the corner"),
-    ("P", "play motions"),
-    ("Space", "progressive: average frames where nothing moves"),
-    ("Tab", "hide or show the panel"),
-    ("Ctrl S", "save picture and scene file"),
-)
+Step = tuple[float, float, float]
 
 
 class Controls:
-    """Takes the input of a frame. `switches` are what single keys turn on and off."""
+    """Takes the input of a frame. `switches` are what single keys turn on and off; saving: whether to save."""
 
     def __init__(self, window: Window, session: Session) -> None:
         from imgui_bundle import imgui
@@ -49,85 +40,183 @@ class Controls:
         self.saving = False
 
     def take(self) -> None:
-        """Change the session as keys and mouse say."""
+        """Change the session as keys and mouse say, unless the panel has them."""
         io = self._imgui.get_io()
-        if not io.want_text_input:
-            self._keys(io)
-        if not io.want_capture_mouse:
-            self._mouse(io)
+        for binding in KEYS:
+            captured = io.want_text_input if isinstance(binding, Press | Hold) else io.want_capture_mouse
+            if not captured:
+                binding.take(self, self._imgui, io)
 
-    def _pressed(self, key: Any) -> bool:
-        return bool(self._imgui.is_key_pressed(key, repeat=False))
+    def toggle(self, switch: str) -> None:
+        """Turn one of the switches on or off."""
+        self.switches[switch] = not self.switches[switch]
 
-    def _axis(self, less: Any, more: Any) -> float:
-        return float(self._imgui.is_key_down(more)) - float(self._imgui.is_key_down(less))
+    def save(self) -> None:
+        """Ask for a saved picture, once the frame is drawn."""
+        self.saving = True
 
-    def _keys(self, io: Any) -> None:
-        key, session = self._imgui.Key, self._session
-        for number, name in zip((key._1, key._2, key._3), SCENES, strict=True):
-            if self._pressed(number):
-                session.open(name)
-        for letter, switch in ((key.f, "frames"), (key.m, "map"), (key.tab, "panel")):
-            if self._pressed(letter):
-                self.switches[switch] = not self.switches[switch]
-        if io.key_ctrl:
-            self.saving = self.saving or self._pressed(key.s)
-            return
-        if self._pressed(key.l):
-            self.light_to_camera()
-        if self._pressed(key.v):
-            session.from_light = not session.from_light
-            session.moved()
-        if self._pressed(key.p):
-            session.playing = not session.playing
-        if self._pressed(key.space):
-            session.progressive = not session.progressive
-        step = SPEED * session.scene.geometry.diagonal * min(io.delta_time, SLOWEST)
-        fly = self._axis(key.a, key.d), self._axis(key.q, key.e), self._axis(key.s, key.w)
-        if any(fly):
-            self._fly(moved(session.eye, tuple(np.multiply(fly, step))))
-        push = (
-            self._axis(key.left_arrow, key.right_arrow),
-            self._axis(key.page_down, key.page_up),
-            self._axis(key.down_arrow, key.up_arrow),
-        )
-        if any(push):
-            self._push(tuple(np.multiply(push, step)))
+    def open_scene(self, number: int) -> None:
+        """Open a built-in scene by its number, from 0."""
+        self._session.open(SCENES[number])
 
-    def _mouse(self, io: Any) -> None:
-        session, button = self._session, self._imgui.MouseButton_
-        x, y = io.mouse_delta.x, io.mouse_delta.y
-        if io.mouse_wheel:
-            self._fly(moved(session.eye, (0.0, 0.0, io.mouse_wheel * SPEED / 4 * session.scene.geometry.diagonal)))
-        if not (x or y):
-            return
-        # The way to where a button goes down is no part of the drag.
-        if any(self._imgui.is_mouse_clicked(one) for one in (button.left, button.right)):
-            return
-        if self._imgui.is_mouse_down(button.left):
-            self._fly(turned(session.eye, x * TURN, -y * TURN))
-        elif self._imgui.is_mouse_down(button.right) and io.key_shift:
-            light = session.spotlight
-            session.shine(as_light(light, turned(as_camera(light), x * TURN, -y * TURN)))
-        elif self._imgui.is_mouse_down(button.right):
+    def play(self) -> None:
+        """Start or stop the scene's motions."""
+        self._session.playing = not self._session.playing
+
+    def average(self) -> None:
+        """Start or stop averaging frames."""
+        self._session.progressive = not self._session.progressive
+
+    def swap_view(self) -> None:
+        """See from the light, or from the camera again."""
+        self._session.from_light = not self._session.from_light
+        self._session.invalidate()
+
+    def move_light_to_camera(self) -> None:
+        """Put the light where the camera is, and let it look the same way."""
+        self._session.shine(as_light(self._session.spotlight, self._session.camera))
+
+    def fly(self, diagonals: Step) -> None:
+        """Move what flies by (right, up, forward) along its own axes."""
+        self._see(move(self._session.eye, self._scale(diagonals)))
+
+    def look_around(self, x: float, y: float) -> None:
+        """Turn what flies by a way of the mouse, pixels."""
+        self._see(turn(self._session.eye, x * TURN, -y * TURN))
+
+    def push_light(self, diagonals: Step) -> None:
+        """Move the light by (right, up, forward) along the axes of the camera."""
+        session = self._session
+        by = np.asarray(self._scale(diagonals)) @ session.camera.axes
+        light = as_camera(session.spotlight)
+        right, up, forward = by @ light.axes.T
+        session.shine(as_light(session.spotlight, move(light, (right, up, forward))))
+
+    def drag_light(self, x: float, y: float) -> None:
+        """Move the light by a way of the mouse, pixels; with Shift turn it."""
+        if self._imgui.get_io().key_shift:
+            light = self._session.spotlight
+            self._session.shine(as_light(light, turn(as_camera(light), x * TURN, -y * TURN)))
+        else:
             height = max(self._window.size[1], 1)
-            scale = session.scene.geometry.diagonal / 2 / height
-            self._push((x * scale, -y * scale, 0.0))
+            self.push_light((x / 2 / height, -y / 2 / height, 0.0))
 
-    def _fly(self, eye: Camera) -> None:
+    def _see(self, eye: Camera) -> None:
+        """Take `eye` for what flies: the camera, or the light while the picture is seen from it."""
         if self._session.from_light:
             self._session.shine(as_light(self._session.spotlight, eye))
         else:
             self._session.look(eye)
 
-    def _push(self, step: tuple[float, ...]) -> None:
-        """Move the light along the axes of the camera."""
-        session = self._session
-        by = np.asarray(step) @ session.camera.axes
-        light = as_camera(session.spotlight)
-        own = by @ light.axes.T
-        session.shine(as_light(session.spotlight, moved(light, (own[0], own[1], own[2]))))
+    def _scale(self, diagonals: Step) -> Step:
+        """Convert diagonals of the scene to world units."""
+        x, y, z = (self._session.scene.geometry.diagonal * value for value in diagonals)
+        return x, y, z
 
-    def light_to_camera(self) -> None:
-        """Put the light where the camera is."""
-        self._session.shine(as_light(self._session.spotlight, self._session.camera))
+
+@dataclass(frozen=True)
+class Press:
+    """Keys that act once as they go down: `label` names them, "F", "Ctrl S" or "1 2 3".
+
+    act: gets the number of the key in the label, from 0.
+    """
+
+    label: str
+    text: str
+    act: Callable[[Controls, int], None]
+
+    def take(self, controls: Controls, imgui: Any, io: Any) -> None:
+        """Act on the keys that went down for this frame."""
+        names = self.label.removeprefix("Ctrl ").split()
+        if io.key_ctrl != self.label.startswith("Ctrl "):
+            return
+        for number, name in enumerate(names):
+            if imgui.is_key_pressed(_find_key(imgui, name), repeat=False):
+                self.act(controls, number)
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Keys that act as long as they are down. axes: for each axis the key of its negative and of its positive way."""
+
+    label: str
+    text: str
+    axes: tuple[tuple[str, str], tuple[str, str], tuple[str, str]]
+    act: Callable[[Controls, Step], None]
+
+    def take(self, controls: Controls, imgui: Any, io: Any) -> None:
+        """Act by the time that the last frame took."""
+        down = [[float(imgui.is_key_down(_find_key(imgui, name))) for name in pair] for pair in self.axes]
+        if io.key_ctrl or all(less == more for less, more in down):
+            return
+        way = SPEED * min(io.delta_time, SLOWEST)
+        x, y, z = (way * (more - less) for less, more in down)
+        self.act(controls, (x, y, z))
+
+
+@dataclass(frozen=True)
+class Drag:
+    """A mouse button that acts while the mouse moves."""
+
+    label: str
+    text: str
+    button: str
+    act: Callable[[Controls, float, float], None]
+
+    def take(self, controls: Controls, imgui: Any, io: Any) -> None:
+        """Act by the way of the mouse, but not by its way to where a button goes down."""
+        x, y, buttons = io.mouse_delta.x, io.mouse_delta.y, imgui.MouseButton_
+        clicked = any(imgui.is_mouse_clicked(button) for button in (buttons.left, buttons.right))
+        if (x or y) and not clicked and imgui.is_mouse_down(getattr(buttons, self.button)):
+            self.act(controls, x, y)
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """The mouse wheel."""
+
+    label: str
+    text: str
+    act: Callable[[Controls, float], None]
+
+    def take(self, controls: Controls, imgui: Any, io: Any) -> None:
+        """Act by the notches that the wheel was turned."""
+        del imgui
+        if io.mouse_wheel:
+            self.act(controls, io.mouse_wheel)
+
+
+def _find_key(imgui: Any, name: str) -> Any:
+    return getattr(imgui.Key, f"_{name}" if name.isdigit() else name.lower())
+
+
+FLY = (("A", "D"), ("Q", "E"), ("S", "W"))
+PUSH = (("left_arrow", "right_arrow"), ("page_down", "page_up"), ("down_arrow", "up_arrow"))
+KEYS: tuple[Press | Hold | Drag | Wheel, ...] = (
+    Press(
+        " ".join(str(i + 1) for i in range(len(SCENES))),
+        f"open a built-in scene: {', '.join(SCENES)}",
+        Controls.open_scene,
+    ),
+    Hold("W A S D, Q E", "fly; down and up", FLY, Controls.fly),
+    Wheel("wheel", "fly forward and back", lambda controls, notches: controls.fly((0.0, 0.0, notches * NOTCH))),
+    Drag("left mouse button", "look around", "left", Controls.look_around),
+    Hold("arrows, page up/down", "move the light along the camera's axes", PUSH, Controls.push_light),
+    Drag("right mouse button", "move the light; with Shift, turn it", "right", Controls.drag_light),
+    Press("L", "put the light at the camera", lambda controls, _: controls.move_light_to_camera()),
+    Press("V", "see from the light, and fly it", lambda controls, _: controls.swap_view()),
+    Press(
+        "F",
+        "draw light and VPLs as axes: x red, y green, z, where they shine, blue; dim behind surfaces",
+        lambda controls, _: controls.toggle("frames"),
+    ),
+    Press("M", "show a shadow map in the lower left corner", lambda controls, _: controls.toggle("map")),
+    Press("P", "play the scene's motions", lambda controls, _: controls.play()),
+    Press(
+        "Space",
+        "progressive: average frames with new samples while nothing moves",
+        lambda controls, _: controls.average(),
+    ),
+    Press("Tab", "hide or show the panel", lambda controls, _: controls.toggle("panel")),
+    Press("Ctrl S", "save picture and scene file", lambda controls, _: controls.save()),
+)

@@ -1,4 +1,4 @@
-"""Which files a picture hangs on, graphs and shaders, and whether one of them has changed."""
+"""Watches the files that a picture depends on, graphs and shaders, for changes."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ PERIOD = 0.3
 """Seconds between two looks."""
 
 
-def files(graph: str, plan: Plan) -> set[Path]:
-    """The graph's file and those that it extends, and all files in the folders of shaders."""
+def list_files(graph: str, plan: Plan) -> set[Path]:
+    """Return the graph's file, those that it extends, and all files in the folders of shaders."""
     folders = {package_shaders()} | {step.work.shader_folder for step in plan.steps if step.work.shader_folder}
     shaders = {path for folder in folders for path in folder.rglob("*.*") if path.suffix not in (".py", ".pyc")}
     return shaders | set(graph_files(graph))
 
 
 def is_graph(path: str) -> bool:
-    """Whether a file is a graph: TOML with passes or outputs, where a scene has models."""
+    """Return whether a file is a graph: TOML with passes or outputs, and without the models of a scene."""
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -31,25 +31,25 @@ def is_graph(path: str) -> bool:
     return "model" not in table and bool({"passes", "outputs", "extends"} & table.keys())
 
 
-class Watch:
-    """Looks at the times of files now and then."""
+class FileWatch:
+    """Looks at the times and sizes of files every PERIOD."""
 
     def __init__(self) -> None:
         self._seen: dict[Path, tuple[int, int]] | None = None
         self._next = 0.0
 
-    def changed(self, graph: str, plan: Plan) -> bool:
-        """Whether a file has changed since the last look; no look before its time."""
+    def look(self, graph: str, plan: Plan) -> bool:
+        """Return whether a file has changed since the last look; False while the next one is not due."""
         now = time.monotonic()
         if now < self._next:
             return False
         self._next = now + PERIOD
-        found = _stamps(files(graph, plan))
-        before, self._seen = self._seen, found
-        return before is not None and any(before.get(path, stamp) != stamp for path, stamp in found.items())
+        before, self._seen = self._seen, _read_stamps(list_files(graph, plan))
+        return before is not None and any(before.get(path, stamp) != stamp for path, stamp in self._seen.items())
 
 
-def _stamps(paths: Iterable[Path]) -> dict[Path, tuple[int, int]]:
+def _read_stamps(paths: Iterable[Path]) -> dict[Path, tuple[int, int]]:
+    """Read the time of the last change, in nanoseconds, and the size of each file."""
     stamps = {}
     for path in paths:
         try:

@@ -21,6 +21,8 @@ from deferred_ir.graph.graph import Graph
 from deferred_ir.graph.params import specs
 from deferred_ir.loading import scene_file, scene_file_writer
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
+from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.scene import RenderDefaults
 from deferred_ir.viewer.session import Session
 
@@ -74,7 +76,7 @@ def describe_scene(session: Session, stem: str) -> SceneFile:
     """Return the content of the scene file NAME.toml of what is on screen; stem: NAME."""
     scene, path = session.scene, session.scene.path
     entries = scene_file.read(path).models if path.suffix.lower() == ".toml" else (ModelEntry(path),)
-    camera, light = session.choose_motions()
+    camera, light = _choose_motions(session)
     builtin = _is_builtin(session.graph)
     render = RenderDefaults(
         graph=session.graph if builtin else f"{stem}{GRAPH}",
@@ -84,6 +86,17 @@ def describe_scene(session: Session, stem: str) -> SceneFile:
     )
     models = tuple(_place_model(entry, session.time) for entry in entries)
     return SceneFile(scene.name, models, camera, light, render)
+
+
+def _choose_motions(session: Session) -> tuple[Camera, Spotlight]:
+    """Return the view and the light on screen, with their motions if they are where those begin."""
+    scene = session.scene
+    start, camera, light = scene.at(0.0), session.eye, session.spotlight
+    if camera == replace(start.camera, motion=None):
+        camera = scene.camera
+    if light == replace(start.spotlight, motion=None):
+        light = scene.spotlight
+    return camera, light
 
 
 def _place_model(entry: ModelEntry, time: float) -> ModelEntry:

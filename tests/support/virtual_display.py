@@ -111,8 +111,8 @@ def restore(viewer: Viewer) -> None:
     if (session.graph, session.settings) != ("deferred", FEW) or session.error:
         session.change("deferred", FEW)
     session.seed, session.from_light, session.playing, session.progressive = 0, False, False, False
-    panel.truth.truth.stop()
-    panel.truth.truth.result, panel.passes.pinned, panel.maps.light, panel.saved = None, None, 0, ""
+    panel.reference.job.stop()
+    panel.reference.job.result, panel.passes.pinned, panel.maps.light, panel.saved = None, None, 0, ""
     viewer.controls.switches.update(frames=False, map=False, panel=True)
     viewer.window.resize((SIZE[0] + WIDTH, SIZE[1]))
     act(viewer, "mousemove", 20, 20, frames=2)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from PIL import Image
 from virtual_display import FEW, SIZE, act, cornell, picture, rendered, xdo
 
 from deferred_ir.cli import main
+from deferred_ir.viewer.controls import KEYS
 from deferred_ir.viewer.panels.side_panel import WIDTH
 
 
@@ -98,3 +101,10 @@ def test_tab_hides_the_panel_and_the_picture_takes_its_place(viewer):
     assert viewer.session.size == (SIZE[0] + WIDTH, SIZE[1])
     act(viewer, "key", "Tab")
     assert viewer.session.size == SIZE
+
+
+def test_the_documentation_has_the_table_of_keys():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "viewer.md").read_text()
+    table = page.partition("## Keys and mouse")[2].partition("##")[0]
+    rows = re.findall(r"^\| (.+) \| (.+) \|$", table, re.MULTILINE)
+    assert rows == [(binding.label, binding.text) for binding in KEYS]

@@ -17,6 +17,7 @@ from deferred_ir.scene.lights.spot import LIGHT
 from deferred_ir.viewer import saving
 from deferred_ir.viewer.panels import light_frames as local_frames
 from deferred_ir.viewer.panels import side_panel as panels
+from deferred_ir.viewer.tone_map import tone_map
 
 
 def test_a_parameter_rebuilds_nothing_and_runs_only_what_reads_it(viewer):
@@ -25,12 +26,12 @@ def test_a_parameter_rebuilds_nothing_and_runs_only_what_reads_it(viewer):
     viewer.frame()
     session.adjust("tonemap.exposure", 1.0)
     viewer.frame()
-    kept, compiled = dict(executor.allocation._resources), executor.library.compiled
+    resources, compiled = dict(executor.allocation._resources), executor.library.compiled
     session.laps.clear()
     for stops in (1.5, 2.0, -3.0):
         session.adjust("tonemap.exposure", stops)
         viewer.frame()
-    assert dict(executor.allocation._resources) == kept
+    assert dict(executor.allocation._resources) == resources
     assert executor.library.compiled == compiled
     assert set(session.laps) == {"tonemap"}
     assert np.array_equal(picture(viewer), rendered(cornell(), set={**FEW, "tonemap.exposure": -3.0}))
@@ -171,35 +172,35 @@ def test_space_averages_frames_and_a_move_starts_again(viewer):
 
 
 def test_the_reference_is_split_into_the_picture_and_measured(viewer):
-    panel = viewer.panel.truth
+    panel = viewer.panel.reference
     panel._spp, panel.at = 0, 0.5
     before = picture(viewer)
     panel.start()
-    while panel.truth.running:
+    while panel.job.running:
         viewer.frame(0.02)
     frames(viewer, 2)
-    assert panel.truth.error == ""
+    assert panel.job.error == ""
     half = SIZE[0] // 2
     assert np.array_equal(picture(viewer)[:, :half], before[:, :half])
-    result, stops = panel.truth.result, automatic_stops(viewer.session.image().radiance)
-    assert np.array_equal(picture(viewer)[:, half:], viewer.session.toned(result.radiance, stops)[::-1, half:, :3])
+    result, stops = panel.job.result, automatic_stops(viewer.session.image().radiance)
+    assert np.array_equal(picture(viewer)[:, half:], tone_map(viewer.session, result.radiance, stops)[::-1, half:, :3])
     with Spy(viewer.panel) as spy:
         viewer.frame()
     assert any(word.startswith("relMSE 0.") for _, word in spy.calls), "in the status line, whatever is open"
     viewer.session.look(replace(viewer.session.camera, fov=50.0))
     frames(viewer, 2)
-    assert not panel._fits
+    assert not panel._matches
 
 
 def test_both_sides_of_the_split_have_the_exposure_of_the_picture(viewer):
     """A reference four times as bright is shown two stops brighter, though the exposure is automatic."""
-    panel, session = viewer.panel.truth, viewer.session
+    panel, session = viewer.panel.reference, viewer.session
     panel._spp = 0
     panel.start()
-    while panel.truth.running:
+    while panel.job.running:
         viewer.frame(0.02)
     radiance = session.image().radiance
-    panel.truth.result = replace(panel.truth.result, radiance=4 * radiance)
+    panel.job.result = replace(panel.job.result, radiance=4 * radiance)
     frames(viewer, 2)
     half, stops = SIZE[0] // 2, automatic_stops(radiance)
     expected = rendered(cornell(), set={**FEW, "tonemap.exposure": stops + 2})
@@ -210,17 +211,17 @@ def test_both_sides_of_the_split_have_the_exposure_of_the_picture(viewer):
     frames(viewer, 2)
     stops = automatic_stops(session.image().radiance)
     expected = rendered(cornell(), set={"vpl.count": 8, "tonemap.exposure": automatic_stops(radiance)})
-    assert np.array_equal(picture(viewer)[:, half:], session.toned(4 * radiance, stops)[::-1, half:, :3])
+    assert np.array_equal(picture(viewer)[:, half:], tone_map(session, 4 * radiance, stops)[::-1, half:, :3])
 
 
 def test_a_trace_can_be_given_up(viewer):
-    panel = viewer.panel.truth
+    panel = viewer.panel.reference
     panel._spp = 3
     panel.start()
     viewer.frame()
-    panel.truth.stop()
-    assert not panel.truth.running
-    assert panel.truth.result is None
+    panel.job.stop()
+    assert not panel.job.running
+    assert panel.job.result is None
     panel._spp = 1
 
 
@@ -277,11 +278,11 @@ def test_a_recorded_way_is_saved_and_plays(viewer, tmp_path, monkeypatch):
     monkeypatch.setattr(path, "PERIOD", 0.0)
     session = viewer.session
     start = session.spotlight
-    session.record(True)
+    session.switch_recording(True)
     viewer.frame()
     act(viewer, "keydown", "Right")
     act(viewer, "keyup", "Right")
-    session.record(False)
+    session.switch_recording(False)
     act(viewer, "key", "ctrl+s")
     saved = load(tmp_path / "cornell-1.toml")
     assert saved.spotlight.motion == session.scene.spotlight.motion is not None
@@ -305,7 +306,7 @@ def test_shaders_and_graphs_are_read_again_and_a_broken_edit_keeps_the_picture(v
     graph = tmp_path / "mine.toml"
     graph.write_text('extends = "deferred"\n[passes.vpl]\ncount = 8\n')
     viewer.session.change(str(graph), {})
-    monkeypatch.setattr(viewer, "watch", file_watch.Watch())
+    monkeypatch.setattr(viewer, "watch", file_watch.FileWatch())
     frames(viewer)
     before = picture(viewer)
     tonemap = folder / "tonemap/tonemap.frag"

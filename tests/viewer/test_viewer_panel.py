@@ -73,16 +73,18 @@ def test_what_is_left_out_is_dim_with_its_reason_and_what_it_saves(viewer):
     assert maps.endswith(" ms")
 
 
-def test_passes_that_are_kept_are_told(viewer):
+def test_skipped_passes_are_marked(viewer):
     frames(viewer, 2)
     viewer.session.look(replace(viewer.session.camera, fov=50.0))
     viewer.frame()
     told = [word for _, word in words(viewer, viewer.panel.passes)]
-    assert "shadow_maps: kept" in told
+    assert "shadow_maps: skipped" in told
     assert "gbuffer" in told
     viewer.session.adjust("tonemap.exposure", 1.0)
     viewer.frame()
-    assert {"gbuffer: kept", "lighting: kept", "tonemap"} <= {word for _, word in words(viewer, viewer.panel.passes)}
+    assert {"gbuffer: skipped", "lighting: skipped", "tonemap"} <= {
+        word for _, word in words(viewer, viewer.panel.passes)
+    }
 
 
 @pytest.mark.parametrize(
@@ -138,7 +140,7 @@ def test_no_word_of_the_panel_is_clipped(tall):
     viewer.controls.switches["map"] = True
     arrange(viewer, *PARTS)
     panel, known, right = viewer.panel, {}, viewer.window.size[0]
-    for part in (panel, panel.passes, panel.maps, panel.truth):
+    for part in (panel, panel.passes, panel.maps, panel.reference):
         with Spy(part) as spy:
             viewer.frame()
         known |= spy.places
@@ -217,12 +219,12 @@ def test_a_camera_path_is_recorded_by_the_checkbox_played_and_saved(viewer, tmp_
     monkeypatch.setattr(panels, "FOLDER", tmp_path)
     monkeypatch.setattr(recording, "PERIOD", 0.0)
     session, start = viewer.session, viewer.session.camera
-    session.record(True)
+    session.switch_recording(True)
     viewer.frame()
     act(viewer, "keydown", "w")
     act(viewer, "keyup", "w")
     end = session.camera
-    session.record(False)
+    session.switch_recording(False)
     assert session.camera == start
     assert session.scene.spotlight.motion is None
     act(viewer, "key", "ctrl+s")
@@ -283,18 +285,18 @@ def test_scene_and_graph_are_chosen_from_lists(tall):
 
 
 def test_a_reference_is_asked_for_by_a_button(tall, monkeypatch):
-    viewer, truth = tall, tall.panel.truth
+    viewer, truth = tall, tall.panel.reference
     monkeypatch.setattr(reference, "SPP", (1, 2))
     truth._spp = 0
     click(viewer, "Passes")
     click(viewer, "Reference")
     told = []
     click(viewer, "compare with reference", truth)
-    while truth.truth.running:
+    while truth.job.running:
         told += [name for name, _ in words(viewer, truth)]
     viewer.frame()
-    assert truth.truth.result is not None
-    assert "progress_bar" in told or truth.truth.progress == 1.0
+    assert truth.job.result is not None
+    assert "progress_bar" in told or truth.job.progress == 1.0
 
 
 def test_a_number_is_typed_into_a_slider(tall):

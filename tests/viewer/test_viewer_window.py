@@ -92,16 +92,16 @@ def test_the_picture_follows_the_window(viewer, size):
 
 
 def test_a_window_is_closed_while_a_reference_is_traced(viewer, client):
-    viewer.panel.truth._spp = 3
-    viewer.panel.truth.start()
+    viewer.panel.reference._spp = 3
+    viewer.panel.reference.start()
     frames(viewer, 2)
-    assert viewer.panel.truth.truth.running
+    assert viewer.panel.reference.job.running
     client.close(identity(viewer))
     start = time.perf_counter()
     viewer.run()
     assert viewer.window.closing
     viewer.panel.close()
-    assert not viewer.panel.truth.truth.running
+    assert not viewer.panel.reference.job.running
     assert time.perf_counter() - start < 10, "it does not wait for the reference"
     import glfw
 

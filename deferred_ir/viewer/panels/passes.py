@@ -14,7 +14,7 @@ Source = tuple[str, str]
 
 
 class PassesPanel:
-    """Rows of what ran and of what was left out. `shown` is the (pass, port) to look at, None for the picture."""
+    """Rows of passes: run, skipped and left out. `shown`: the (pass, port) to look at, None for the picture."""
 
     def __init__(self, imgui: Any, session: Session) -> None:
         self._imgui, self._session = imgui, session
@@ -25,13 +25,13 @@ class PassesPanel:
 
     @property
     def shown(self) -> Source | None:
-        """What the pointer is on, else what is pinned, where the plan still has it."""
+        """The output under the pointer, else the pinned one; None if the plan has no such output any more."""
         source = self._hovered or self.pinned
         known = {(step.name, port) for step in self._session.plan.steps for port in step.outputs}
         return source if source in known else None
 
     def draw(self) -> None:
-        """The table and the sliders for what is shown."""
+        """Draw the table, and sliders for what is pinned."""
         imgui, session = self._imgui, self._session
         self._hovered = None
         self._line("pass, output", ("GPU ms", "CPU ms"))
@@ -44,7 +44,7 @@ class PassesPanel:
             _, self._gain = imgui.slider_float(
                 "brightness", self._gain, 0.01, 100.0, "%.3g", imgui.SliderFlags_.logarithmic
             )
-            texture = _texture(session.output(self.pinned))
+            texture = _find_texture(session.output(self.pinned))
             if texture and texture.layers > 1:
                 most = texture.layers - 1
                 _, self._layer = imgui.slider_int("layer", min(self._layer, most), 0, most)
@@ -64,12 +64,10 @@ class PassesPanel:
         times = (f"{laps[0]:.2f}", f"{laps[1]:.2f}") if laps else ("-", "-")
         if skipped:
             imgui.push_style_color(imgui.Col_.text, imgui.get_style_color_vec4(imgui.Col_.text_disabled))
-        self._line(f"{step.name}: kept" if skipped else step.name, times)
+        self._line(f"{step.name}: skipped" if skipped else step.name, times)
         if skipped:
             imgui.pop_style_color()
-            imgui.set_item_tooltip(
-                "It did not run: nothing that it is made of had changed. The times are of its last run."
-            )
+            imgui.set_item_tooltip("Its inputs are unchanged, so it did not run. The times are those of its last run.")
         for port, output in step.outputs.items():
             source = step.name, port
             pressed, _ = imgui.selectable(
@@ -80,7 +78,7 @@ class PassesPanel:
                 self.pinned = None if self.pinned == source else source
             if imgui.is_item_hovered():
                 self._hovered = source
-                imgui.set_tooltip(f"{output.doc}\n{output.description}: {self._size(source)}")
+                imgui.set_tooltip(f"{output.doc}\n{output.description}: {self._describe_size(source)}")
 
     def _left_out(self, name: str, why: str) -> None:
         imgui, laps = self._imgui, self._session.laps.get(name)
@@ -89,24 +87,27 @@ class PassesPanel:
         imgui.text_disabled(f"{name}: left out: {why}{saved}")
         imgui.pop_text_wrap_pos()
 
-    def _size(self, source: Source) -> str:
-        found = self._session.output(source)
-        if isinstance(found, GpuBuffer):
-            return f"{len(found.records)} of {found.description.records} records, {found.nbytes / 2**20:.2f} MiB"
-        textures = found if isinstance(found, list) else [found] if found else []
+    def _describe_size(self, source: Source) -> str:
+        resource = self._session.output(source)
+        if isinstance(resource, GpuBuffer):
+            return (
+                f"{len(resource.records)} of {resource.description.records} records, {resource.nbytes / 2**20:.2f} MiB"
+            )
+        textures = resource if isinstance(resource, list) else [resource] if resource else []
         if not textures:
             return "has not run yet"
         width, height = textures[0].size
         return f"{width}x{height}, {sum(t.nbytes for t in textures) / 2**20:.2f} MiB"
 
     def show(self, canvas: Canvas, area: Area) -> None:
-        """Draw what is to be looked at over the picture."""
-        texture = _texture(self._session.output(self.shown)) if self.shown else None
+        """Draw the output that is looked at over the picture."""
+        texture = _find_texture(self._session.output(self.shown)) if self.shown else None
         if texture:
             layer = min(self._layer, max(texture.layers - 1, 0))
-            canvas.show(texture, area.fitted(texture.size), gain=self._gain, layer=layer)
+            canvas.show(texture, area.fit(texture.size), gain=self._gain, layer=layer)
 
 
-def _texture(found: Any) -> GpuTexture | None:
-    first = found[0] if isinstance(found, list) and found else found
+def _find_texture(resource: Any) -> GpuTexture | None:
+    """Return a texture, or the first of a list; None for buffers and what has not been drawn."""
+    first = resource[0] if isinstance(resource, list) and resource else resource
     return first if isinstance(first, GpuTexture) else None

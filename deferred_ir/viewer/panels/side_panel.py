@@ -1,4 +1,4 @@
-"""The panel at the right: everything that can be changed, and what it costs."""
+"""The panel at the right of the window: everything that can be changed, and what it costs."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from deferred_ir.graph.file import graph_names
 from deferred_ir.graph.params import specs
 from deferred_ir.loading.load import builtin_scenes
 from deferred_ir.viewer.canvas import Area, Canvas
-from deferred_ir.viewer.controls import HELP, Controls
+from deferred_ir.viewer.controls import KEYS, Controls
 from deferred_ir.viewer.panels import light_frames
 from deferred_ir.viewer.panels.parameters import widget
 from deferred_ir.viewer.panels.passes import PassesPanel
-from deferred_ir.viewer.panels.reference import TruthPanel
+from deferred_ir.viewer.panels.reference import ReferencePanel
 from deferred_ir.viewer.panels.shadow_maps import MapsPanel
 from deferred_ir.viewer.saving import save
 from deferred_ir.viewer.session import Session
@@ -39,7 +39,7 @@ class Panel:
         self._window, self._session, self._controls = window, session, controls
         self.passes = PassesPanel(imgui, session)
         self.maps = MapsPanel(imgui, session, controls)
-        self.truth = TruthPanel(imgui, session)
+        self.reference = ReferencePanel(imgui, session)
         self.saved = ""
         self._scenes = [name for name, _ in builtin_scenes()]
 
@@ -54,10 +54,10 @@ class Panel:
     def busy(self) -> bool:
         """Whether the next frame will differ by itself."""
         session = self._session
-        return session.playing or session.progressive or session.recording or self.truth.truth.running
+        return session.playing or session.progressive or session.recording or self.reference.job.running
 
     def draw(self, area: Area) -> None:
-        """All controls of this frame, and what lies over the picture in `area`."""
+        """Draw all controls of this frame, and the axes of the lights over the picture in `area`."""
         imgui, (width, height) = self._imgui, self._window.size
         if self._controls.switches["frames"]:
             light_frames.draw(imgui, self._session, area, height, self.maps.edge(area))
@@ -74,7 +74,7 @@ class Panel:
             ("Light", self._light, True),
             ("Passes", self.passes.draw, True),
             ("Parameters", self._parameters, False),
-            ("Reference", self.truth.draw, False),
+            ("Reference", self.reference.draw, False),
             ("Shadow map", self.maps.draw, False),
             ("Save", self._save, False),
             ("Keys", self._keys, False),
@@ -95,7 +95,7 @@ class Panel:
         imgui.text(f"{session.scene.name}, {session.size[0]}x{session.size[1]}{lights}, {last}")
         if session.accumulation:
             imgui.text(f"mean of {session.accumulation.frames} frames{session.noise_text}")
-        if distance := self.truth.text:
+        if distance := self.reference.text:
             imgui.text(distance)
         if self.saved:
             imgui.text_wrapped(self.saved)
@@ -128,9 +128,9 @@ class Panel:
         touched, seed = imgui.input_int("seed", session.seed)
         if touched and seed >= 0:
             session.seed = seed
-            session.moved()
+            session.invalidate()
         _, session.progressive = imgui.checkbox("progressive (Space)", session.progressive)
-        imgui.set_item_tooltip("Average frames with new samples where nothing moves.")
+        imgui.set_item_tooltip("Average frames with new samples while nothing moves.")
         if session.scene.moves:
             _, session.playing = imgui.checkbox("play motions (P)", session.playing)
 
@@ -140,7 +140,7 @@ class Panel:
         most = max(session.emission)
         now = max(light.emission) / most if most else 0.0
         touched, power = imgui.slider_float("intensity", now, 0.0, BRIGHTEST, "%.3g", imgui.SliderFlags_.logarithmic)
-        imgui.set_item_tooltip("Times the light of the scene file.")
+        imgui.set_item_tooltip("Factor on the emission in the scene file.")
         if touched:
             r, g, b = session.emission
             session.shine(replace(light, emission=(r * power, g * power, b * power)))
@@ -151,13 +151,13 @@ class Panel:
         if touched:
             session.look(replace(session.camera, fov=fov))
         if imgui.button("light to camera (L)"):
-            self._controls.light_to_camera()
+            self._controls.move_light_to_camera()
         imgui.same_line()
-        touched, session.from_light = imgui.checkbox("see from it (V)", session.from_light)
+        touched, session.from_light = imgui.checkbox("see from the light (V)", session.from_light)
         if touched:
-            session.moved()
+            session.invalidate()
         switches = self._controls.switches
-        _, switches["frames"] = imgui.checkbox("light and VPLs as local frames (F)", switches["frames"])
+        _, switches["frames"] = imgui.checkbox("light and VPLs as axes (F)", switches["frames"])
 
     def _parameters(self) -> None:
         imgui, session = self._imgui, self._session
@@ -177,15 +177,15 @@ class Panel:
     def _save(self) -> None:
         imgui, session = self._imgui, self._session
         if imgui.button("save PNG, EXR and scene file (Ctrl S)"):
-            self._controls.saving = True
-        imgui.set_item_tooltip("Into the folder that the viewer was started in.")
+            self._controls.save()
+        imgui.set_item_tooltip("Writes to the folder that the viewer was started in.")
         touched, on = imgui.checkbox("record camera and light", session.recording)
-        imgui.set_item_tooltip("Switched off, it becomes the scene's motion, which plays and is saved.")
+        imgui.set_item_tooltip("When switched off, the path becomes the scene's motion: it can be played and is saved.")
         if touched:
-            session.record(on)
+            session.switch_recording(on)
 
     def finish(self) -> None:
-        """What waits until the frame is drawn: saving it."""
+        """Save the frame if asked to, now that it is drawn."""
         if not self._controls.saving:
             return
         self._controls.saving = False
@@ -195,17 +195,17 @@ class Panel:
             self.saved = str(error)
 
     def _keys(self) -> None:
-        for key, text in HELP:
-            self._imgui.text_disabled(key)
+        for binding in KEYS:
+            self._imgui.text_disabled(binding.label)
             self._imgui.same_line()
-            self._imgui.text_wrapped(text)
+            self._imgui.text_wrapped(binding.text)
 
     def show(self, canvas: Canvas, area: Area) -> None:
-        """What lies over the picture and is made of textures."""
-        self.truth.show(canvas, area)
+        """Draw the textures that lie over the picture."""
+        self.reference.show(canvas, area)
         self.passes.show(canvas, area)
         self.maps.show(canvas, area)
 
     def close(self) -> None:
-        """End what runs in the background."""
-        self.truth.close()
+        """End work in the background."""
+        self.reference.close()

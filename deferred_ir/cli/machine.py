@@ -14,7 +14,7 @@ from importlib import metadata
 from pathlib import Path
 
 from deferred_ir.base.errors import DeviceError
-from deferred_ir.gl import devices
+from deferred_ir.gl import devices, egl
 
 DISTRIBUTION = "deferred-ir"
 OPTIONAL_FEATURES = {
@@ -152,8 +152,8 @@ def _check_rays() -> Check:
 
 
 def _check_library() -> Check:
-    fault = devices.load_fault(devices.libegl())
-    return Check("EGL library", not fault, fault or devices.libegl(), devices.INSTALL if fault else "")
+    fault = egl.load_fault(egl.libegl())
+    return Check("EGL library", not fault, fault or egl.libegl(), egl.INSTALL if fault else "")
 
 
 def _check_vendors() -> Check:
@@ -168,27 +168,25 @@ def _check_vendors() -> Check:
         except (OSError, ValueError, KeyError) as error:
             broken.append(f"{path}: {error}")
             continue
-        fault = devices.load_fault(library)
+        fault = egl.load_fault(library)
         if fault:
             broken.append(f"{path.name} ({fault})")
         else:
             found.append(f"{path.name} ({library})")
     ok = bool(found) and not broken
-    return Check("EGL drivers", ok, "; ".join(found + broken) or "none", "" if ok else devices.INSTALL, optional=True)
+    return Check("EGL drivers", ok, "; ".join(found + broken) or "none", "" if ok else egl.INSTALL, optional=True)
 
 
 def _check_devices() -> Check:
     try:
-        found = devices.list_devices()
+        found = egl.list_devices()
     except DeviceError as error:
         what, _, mend = str(error).partition("; ")
         return Check("devices", False, what, mend)
     mend = ""
     if not any(device.kind == "hardware" for device in found):
         mend = _explain_missing_hardware()
-    return Check(
-        "devices", bool(found), ", ".join(map(str, found)) or "none", mend or ("" if found else devices.INSTALL)
-    )
+    return Check("devices", bool(found), ", ".join(map(str, found)) or "none", mend or ("" if found else egl.INSTALL))
 
 
 def _explain_missing_hardware() -> str:

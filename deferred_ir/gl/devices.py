@@ -1,23 +1,20 @@
-"""Which OpenGL devices there are, and a headless context on one of them.
+"""Chooses a device by what `--device` says, and opens an OpenGL context on it.
 
-EGL lists the devices; each gets a name that `--device` accepts. Contexts come from glcontext, whose loader is kept,
-because the rest of this package calls OpenGL functions that moderngl does not have.
-
-CUDA_VISIBLE_DEVICES does not reorder EGL devices: choose by `cuda:N`, which asks the driver for the mapping.
+Contexts come from glcontext. Its loader is returned with each, because the rest of this package calls OpenGL functions
+that moderngl does not have.
 """
 
 from __future__ import annotations
 
-import ctypes
 import logging
 import os
 import re
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from deferred_ir.base.errors import DeviceError, did_you_mean
+from deferred_ir.gl.egl import INSTALL, NO_DRIVER, Device, libegl, list_devices
 
 if TYPE_CHECKING:
     import moderngl
@@ -26,16 +23,7 @@ log = logging.getLogger("deferred_ir")
 
 FLOOR = 430
 """The least OpenGL version that the shaders run on, as moderngl writes it."""
-INSTALL = "apt install libegl1 libgl1-mesa-dri"
-"""The mend where a system has no OpenGL at all."""
-NO_DRIVER = (
-    f"device: EGL finds no driver; {INSTALL}, or in a container with an NVIDIA GPU set NVIDIA_DRIVER_CAPABILITIES=all"
-)
 
-_EXTENSIONS = 0x3055
-_DRM_FILE = 0x3233
-_RENDERER = 0x335F
-_CUDA = 0x323A
 _SOFTWARE_NAMES = re.compile(r"llvmpipe|softpipe|swrast|swiftshader|software", re.IGNORECASE)
 
 _MENDS = (
@@ -51,93 +39,14 @@ _MENDS = (
 
 
 class Loader(Protocol):
-    """What a glcontext object offers: the addresses of OpenGL functions."""
+    """A glcontext object, which knows the addresses of OpenGL functions."""
 
     def load(self, name: str) -> int:
-        """Address of the function `name`, 0 if there is none."""
-
-
-@dataclass(frozen=True)
-class Device:
-    """One device that OpenGL can run on.
-
-    index: its place in EGL's list. name: GL_RENDERER once a context is open, before that what EGL tells.
-    drm: its device file, if any. cuda: CUDA's number for it, if any. spec: what `--device` takes, as `egl:0`.
-    """
-
-    index: int
-    kind: Literal["hardware", "software"]
-    name: str
-    drm: str | None
-    cuda: int | None
-    spec: str
-
-    def __str__(self) -> str:
-        return f"{self.name} ({self.spec}, {self.kind})"
-
-
-def libegl() -> str:
-    """File name of the EGL library. A soname, because the plain name exists only in -dev packages."""
-    return os.environ.get("GLCONTEXT_LINUX_LIBEGL") or "libEGL.so.1"
-
-
-def load_fault(library: str) -> str:
-    """Why a shared library cannot be loaded, "" if it can."""
-    try:
-        ctypes.CDLL(library)
-    except OSError as error:
-        return str(error)
-    return ""
-
-
-def list_devices() -> list[Device]:
-    """All EGL devices, in EGL's order. Raises DeviceError if EGL or its device extensions are missing."""
-    # Mesa warns on stderr of each device that fails, which `auto` passes over; our own errors tell it all.
-    os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
-    try:
-        egl = ctypes.CDLL(libegl())
-    except OSError as error:
-        raise DeviceError(f"device: {libegl()} cannot be loaded ({error}); install it: {INSTALL}") from error
-    query_devices = _function(egl, "eglQueryDevicesEXT", ctypes.c_uint, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
-    query_string = _function(egl, "eglQueryDeviceStringEXT", ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int)
-    query_number = _function(
-        egl, "eglQueryDeviceAttribEXT", ctypes.c_uint, ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p
-    )
-    count = ctypes.c_int()
-    query_devices(0, None, ctypes.byref(count))
-    handles = (ctypes.c_void_p * count.value)()
-    query_devices(count.value, handles, ctypes.byref(count))
-
-    def text(handle: int, name: int) -> str | None:
-        value = query_string(handle, name)
-        return value.decode(errors="replace") if value else None
-
-    def describe(index: int, handle: int) -> Device:
-        extensions = (text(handle, _EXTENSIONS) or "").split()
-        software = "EGL_MESA_device_software" in extensions
-        drm = text(handle, _DRM_FILE) if "EGL_EXT_device_drm" in extensions else None
-        number = ctypes.c_ssize_t(-1)
-        if "EGL_NV_device_cuda" in extensions:
-            query_number(handle, _CUDA, ctypes.byref(number))
-        cuda = number.value if number.value >= 0 else None
-        name = text(handle, _RENDERER) if "EGL_EXT_device_query_name" in extensions else None
-        fallback = "software rasteriser" if software else "NVIDIA GPU" if cuda is not None else drm or "GPU"
-        return Device(index, "software" if software else "hardware", name or fallback, drm, cuda, f"egl:{index}")
-
-    return [describe(index, handle) for index, handle in enumerate(handles[: count.value]) if handle]
-
-
-def _function(egl: ctypes.CDLL, name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
-    get = egl.eglGetProcAddress
-    get.restype, get.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
-    address = get(name.encode())
-    if not address:
-        raise DeviceError(NO_DRIVER)
-    return ctypes.CFUNCTYPE(result, *arguments)(address)
+        """Return the address of the function `name`, 0 if there is none."""
 
 
 def create_context(device: str = "auto") -> tuple[moderngl.Context, Loader, Device]:
-    """A headless OpenGL 4.3 core context, current in this thread; also its function loader, and where it runs.
+    """Open a headless OpenGL 4.3 core context, current in this thread. Returns it, its function loader and its device.
 
     device: `auto` (the first hardware device that gives a context, else software), `software`, `egl:N`, `cuda:N`,
     or part of a device's name. `auto` follows GLCONTEXT_DEVICE_INDEX; any other choice overrules it.
@@ -146,7 +55,7 @@ def create_context(device: str = "auto") -> tuple[moderngl.Context, Loader, Devi
     if not device.strip():
         raise DeviceError("device '': names none; take auto, or one that `deferred-ir devices` lists")
     if sys.platform == "win32":
-        return _chosen(*_create_default())
+        return _log_choice(*_create_default())
     if sys.platform == "darwin":
         raise DeviceError("device: macOS offers OpenGL 4.1, and 4.3 is needed; run in a Linux container or machine")
     devices = list_devices()
@@ -156,20 +65,20 @@ def create_context(device: str = "auto") -> tuple[moderngl.Context, Loader, Devi
     if device == "auto" and index:
         device = f"egl:{index}"
     if device == "auto":
-        return _chosen(*_create_auto(devices))
-    candidates = _matching(device, devices)
+        return _log_choice(*_create_auto(devices))
+    candidates = _match(device, devices)
     if candidates:
-        return _chosen(*open_device(candidates[0]))
-    return _chosen(*_create_by_renderer(device, devices))
+        return _log_choice(*open_device(candidates[0]))
+    return _log_choice(*_create_by_renderer(device, devices))
 
 
-def _chosen(context: moderngl.Context, loader: Loader, device: Device) -> tuple[moderngl.Context, Loader, Device]:
+def _log_choice(context: moderngl.Context, loader: Loader, device: Device) -> tuple[moderngl.Context, Loader, Device]:
     log.info("OpenGL %s on %s", context.info["GL_VERSION"], device)
     return context, loader, device
 
 
-def _matching(wanted: str, devices: list[Device]) -> list[Device]:
-    """The devices that `wanted` names by number, kind or listed name; [] for a name that no listing holds."""
+def _match(wanted: str, devices: list[Device]) -> list[Device]:
+    """Return the devices that `wanted` names by number, kind or listed name; [] for a name that EGL does not list."""
     if wanted == "software":
         found = [device for device in devices if device.kind == "software"]
         if not found:
@@ -188,7 +97,7 @@ def _matching(wanted: str, devices: list[Device]) -> list[Device]:
 
 
 def _create_auto(devices: list[Device]) -> tuple[moderngl.Context, Loader, Device]:
-    """The first device that works, hardware before software.
+    """Open the first device that works, hardware before software.
 
     A device that EGL lists as hardware may still be drawn in software (a card without its driver): it comes second.
     """
@@ -210,7 +119,7 @@ def _create_auto(devices: list[Device]) -> tuple[moderngl.Context, Loader, Devic
 
 
 def _create_by_renderer(wanted: str, devices: list[Device]) -> tuple[moderngl.Context, Loader, Device]:
-    """The first device whose GL_RENDERER holds `wanted`; many drivers tell it only once a context is open."""
+    """Open the first device whose GL_RENDERER contains `wanted`; many drivers tell it only once a context is open."""
     names = {device.spec for device in devices} | {"auto", "software"}
     for device in devices:
         try:
@@ -226,7 +135,7 @@ def _create_by_renderer(wanted: str, devices: list[Device]) -> tuple[moderngl.Co
 
 
 def open_device(device: Device) -> tuple[moderngl.Context, Loader, Device]:
-    """A context on exactly this device; the returned Device has GL_RENDERER as its name."""
+    """Open a context on exactly this device. The returned Device has GL_RENDERER as its name."""
     try:
         return _open(device, FLOOR)
     except DeviceError as error:
@@ -280,7 +189,7 @@ def _open(device: Device, version: int) -> tuple[moderngl.Context, Loader, Devic
 
 
 def _create_default() -> tuple[moderngl.Context, Loader, Device]:
-    """The context of the system's default device, where there is no EGL (Windows)."""
+    """Open a context on the system's default device, where there is no EGL (Windows)."""
     import glcontext
     import moderngl
 
@@ -294,7 +203,7 @@ def _create_default() -> tuple[moderngl.Context, Loader, Device]:
 
 
 def adopt(window: Loader) -> tuple[moderngl.Context, Loader, Device]:
-    """The context of a window, which is current: as `create_context` gives a headless one. DeviceError below 4.3."""
+    """Return the current context, that of a window, as `create_context` does. Raises DeviceError below OpenGL 4.3."""
     import moderngl
 
     opened: Any = window  # moderngl's annotation knows only dictionaries, its code such objects
@@ -304,11 +213,11 @@ def adopt(window: Loader) -> tuple[moderngl.Context, Loader, Device]:
         raise DeviceError(f"device: no OpenGL 4.3 in the window ({error}); update the graphics driver") from error
     name = context.info["GL_RENDERER"]
     kind: Literal["hardware", "software"] = "software" if _SOFTWARE_NAMES.search(name) else "hardware"
-    return _chosen(context, window, Device(0, kind, name, None, None, "window"))
+    return _log_choice(context, window, Device(0, kind, name, None, None, "window"))
 
 
 def close(context: moderngl.Context, loader: Any) -> None:
-    """Destroy a context; unbound first, for EGL keeps one that is current."""
+    """Destroy a context. It is unbound first, because EGL keeps one that is current."""
     context.release()
     loader.__exit__(None, None, None)
     loader.release()

@@ -8,7 +8,7 @@ from deferred_ir.base.errors import DeviceError
 from deferred_ir.cli import machine
 from deferred_ir.cli.commands.devices import format_devices
 from deferred_ir.cli.machine import Check
-from deferred_ir.gl import devices
+from deferred_ir.gl import devices, egl
 
 
 def find(results, name):
@@ -54,9 +54,9 @@ def test_a_fault_is_marked_followed_by_its_mend_and_counts():
 
 def test_without_a_device_the_doctor_still_reports(monkeypatch):
     def fail(*_):
-        raise DeviceError(devices.NO_DRIVER)
+        raise DeviceError(egl.NO_DRIVER)
 
-    monkeypatch.setattr(devices, "list_devices", fail)
+    monkeypatch.setattr(egl, "list_devices", fail)
     monkeypatch.setattr(devices, "create_context", fail)
     results = machine.run_checks()
     assert not find(results, "devices").ok
@@ -88,9 +88,9 @@ def test_an_unknown_device_is_a_fault_with_a_mend():
 
 
 def test_the_devices_table_marks_one_choice_and_says_why_a_device_fails(monkeypatch):
-    broken = devices.Device(98, "hardware", "card", "/dev/dri/card9", 3, "egl:98")
-    listed = devices.list_devices()
-    monkeypatch.setattr(devices, "list_devices", lambda: [broken, *listed])
+    broken = egl.Device(98, "hardware", "card", "/dev/dri/card9", 3, "egl:98")
+    listed = egl.list_devices()
+    monkeypatch.setattr(egl, "list_devices", lambda: [broken, *listed])
     lines = format_devices().splitlines()
     assert len(lines) == 2 + len(listed)
     assert "requested device index 98" in lines[1]

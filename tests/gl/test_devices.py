@@ -9,7 +9,7 @@ import pytest
 
 from deferred_ir.base.errors import DeviceError
 from deferred_ir.gl import devices
-from deferred_ir.gl.devices import Device
+from deferred_ir.gl.egl import Device
 
 GPU = Device(0, "hardware", "NVIDIA GPU", "/dev/dri/card0", 1, "egl:0")
 OTHER_GPU = Device(1, "hardware", "NVIDIA GPU", "/dev/dri/card1", 0, "egl:1")

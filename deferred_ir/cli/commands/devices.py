@@ -7,7 +7,7 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from deferred_ir.gl.devices import Device
+    from deferred_ir.gl.egl import Device
 
 HELP = "List the devices that OpenGL can run on."
 ORDER = 100
@@ -30,11 +30,11 @@ def format_devices() -> str:
     Raises DeviceError if there is no EGL, or no driver, at all.
     """
     from deferred_ir.base.errors import DeviceError
-    from deferred_ir.gl import devices
+    from deferred_ir.gl import egl
 
-    opened = [_try(device) for device in devices.list_devices()] if sys.platform == "linux" else [_open_default()]
+    opened = [_try(device) for device in egl.list_devices()] if sys.platform == "linux" else [_open_default()]
     if not opened:
-        raise DeviceError(devices.NO_DRIVER)
+        raise DeviceError(egl.NO_DRIVER)
     usable = [device for device, _, works in opened if works]
     usable.sort(key=lambda device: device.kind == "software")
     rows = [("", "DEVICE", "KIND", "CUDA", "FILE", "NAME", "OPENGL")]

@@ -72,7 +72,7 @@ class NearField(Pass):
             io.framebuffer.clear_color()
             return
         block = io.meta("vpls", SharesMeta).n if io["vpls"] else 1
-        seen = frame.surfaces(io["depth"], io["normals"])
+        seen = frame.read_surfaces(io["depth"], io["normals"])
         job = PixelJob(frame.tracer(), seen, frame.size, block, frame.seed)
         bounces = io.meta("lights", LightsMeta).bounces
         image = trace_residual(job, read_limits(vpl), samples=self.params.samples, bounces=bounces)

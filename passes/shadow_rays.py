@@ -81,7 +81,7 @@ class ShadowRays(Pass):
     def execute(self, frame: Frame, io: Io) -> None:
         """Read back, trace, upload."""
         vpls, parts = io["vpls"].records, io["vpls"].description.parts
-        tracer, seen = frame.tracer(), frame.surfaces(io["depth"], io["normals"])
+        tracer, seen = frame.tracer(), frame.read_surfaces(io["depth"], io["normals"])
         n = round(parts**0.5)
         share, place = find_places(seen.pixel, frame.size, n)
         starts = find_share_starts(len(vpls), n)

@@ -58,7 +58,7 @@ class ThinRays(Pass):
         bits = np.zeros((height * width, 2), np.uint32)
         listed = io["thin"].read().reshape(-1)[:count]
         bits[listed] = io["missing"].read().reshape(-1, 2)[listed]
-        seen = frame.surfaces(io["depth"], io["normals"])
+        seen = frame.read_surfaces(io["depth"], io["normals"])
         asking = seen.rows(np.flatnonzero(bits[seen.pixel].any(axis=1)))
         image = np.zeros((height * width, 4), np.float32)
         if len(vpls) and len(asking.pixel):

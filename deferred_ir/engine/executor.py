@@ -45,7 +45,7 @@ class Executor:
         self.allocation.fit(plan, frame.size, alias=not (frame.reuse or frame.keep_all))
         self.counters.clear()
         skipped: list[str] = []
-        self._frame_block.write(frame.block())
+        self._frame_block.write(frame.pack())
         self._frame_block.bind_to_uniform_block(FRAME_BLOCK)
         frame.buffers.bind()
         for step, io in zip(plan.steps, self.allocation.ios, strict=True):

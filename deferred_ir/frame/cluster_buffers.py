@@ -1,4 +1,4 @@
-"""Clusters of triangles on the GPU, each drawn once for every light that may see it, all in one indirect call."""
+"""Clusters of triangles on the GPU. One indirect call draws each cluster once for every light that may see it."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from deferred_ir.gl.shaders import Program
 from deferred_ir.meshes.posed import PosedMesh
 
 COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index", "base_vertex", "base_instance")])
-"""What glMultiDrawElementsIndirect reads of each draw."""
+"""A command of glMultiDrawElementsIndirect."""
 
 
 class ClusterBuffers:
-    """Indices of a mesh's faces in the order of its clusters, and what a call draws of them.
+    """Indices of a mesh's faces in the order of its clusters, and the commands of the draw calls.
 
-    positions: the buffer of vertices, three floats each; it stays its maker's.
+    positions: the buffer of vertices, three floats each; the caller owns it.
     """
 
     def __init__(self, gpu: Gpu, posed: PosedMesh, positions: Any) -> None:
@@ -44,12 +44,12 @@ class ClusterBuffers:
         return size
 
     def move(self, number: int, pose: Array) -> None:
-        """Bring moving model `number` from rest by `pose` (4, 4), its vertices, too."""
+        """Move model `number` to `pose` (4, 4), relative to its rest: its clusters and its vertices."""
         first, points = self.posed.move(number, pose)
         self._positions.write(points.tobytes(), offset=12 * first)
 
     def draw_all(self, program: Program, light: np.ndarray) -> None:
-        """Draw all that makes up the scene for one light, LIGHT records (1,). The program reads `position` alone."""
+        """Draw all clusters for one light, LIGHT records (1,). The program reads `position` alone."""
         commands = self._each[self.clusters.drawn(light)[0]]
         commands["instances"] = 1
         self._commands.write(commands.tobytes())
@@ -79,7 +79,7 @@ class ClusterBuffers:
         self._array(program).render_indirect(self._commands, mode, count=len(commands))
 
     def _array(self, program: Program) -> Any:
-        """What `program` reads of it."""
+        """Return the vertex array with what `program` reads."""
         if self not in program.arrays:
             # An instanced attribute counts from base_instance; gl_InstanceID does not.
             known = [(self._positions, "3f", "position"), (self._lights, "1i/i", "light_index")]
@@ -90,6 +90,6 @@ class ClusterBuffers:
         return program.arrays[self]
 
     def release(self) -> None:
-        """Give the buffers back. Vertex arrays that programs keep for it must go first."""
+        """Delete the buffers. Vertex arrays that programs hold for them must go first."""
         for buffer in (self._indices, self._lights, self._commands):
             buffer.release()

@@ -1,4 +1,4 @@
-"""One frame: what passes are told about it, and the uniform block in which shaders read it."""
+"""One frame in time: what passes know of it, and the uniform block in which shaders read it."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ FRAME = np.dtype(
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """What a pass may know of a frame. `scene` has camera and light at `time` [s]; `buffers` is it on the GPU.
+    """What a pass may know of a frame. scene: with camera and light at `time` [s]. buffers: the scene on the GPU.
 
-    reuse: what the last frame left may be used again where it would come out the same.
+    reuse: results of the last frame may be used again where they would come out the same.
     keep_all: nothing may be left out that another scene or view would need.
     """
 
@@ -59,7 +59,7 @@ class Frame:
 
     @property
     def by_view(self) -> bool:
-        """Whether what this camera's view does not need may be left out: the next frame is drawn afresh."""
+        """Whether passes may leave out what this view does not need, because the next frame will not reuse it."""
         return not (self.reuse or self.keep_all)
 
     @property
@@ -72,8 +72,8 @@ class Frame:
         """Near plane of the camera and of all lights, in world units."""
         return NEAR * self.scene.geometry.scale
 
-    def surfaces(self, depth: GpuTexture, normals: GpuTexture) -> Surfaces:
-        """What the pixels of a G-buffer show, read back when first asked for: after both textures were written."""
+    def read_surfaces(self, depth: GpuTexture, normals: GpuTexture) -> Surfaces:
+        """Return the surfaces that the pixels of a G-buffer show, read back once, after both textures were written."""
         key = depth, normals
         if key not in self._surfaces:
             smooth = self.scene.geometry.normals is not None
@@ -82,8 +82,8 @@ class Frame:
             )
         return self._surfaces[key]
 
-    def block(self) -> bytes:
-        """The FRAME record."""
+    def pack(self) -> bytes:
+        """Return the FRAME record."""
         record = np.zeros((), FRAME)
         camera = self.scene.camera
         rays = camera.ray_axes(self.size)

@@ -12,20 +12,17 @@ from deferred_ir.graph.pass_base import Pass
 
 
 class FullscreenPass(Pass):
-    """A pass that runs `fragment` once a pixel: inputs are samplers and parameters are uniforms of the same name.
-
-    A pass of this kind is its ports and its parameters.
-    """
+    """A pass that runs the shader `fragment` once a pixel; inputs are samplers, parameters uniforms of their name."""
 
     fragment: ClassVar[str]
     vertex: ClassVar[str] = "fullscreen.vert"
 
     def uniforms(self) -> Mapping[str, Any]:
-        """Uniform values; parameters by default."""
+        """Return the values of uniforms: the parameters, unless overridden."""
         return {name: getattr(self.params, name) for name in specs(self.Params)}
 
     def defines(self, frame: Frame) -> Mapping[str, int | float]:
-        """Defines that choose a variant of the shader for this frame; none by default."""
+        """Return defines that choose a variant of the shader for this frame: none, unless overridden."""
         del frame
         return NO_DEFINES
 

@@ -23,11 +23,11 @@ SCENE_SAMPLERS = {"albedo_texture"}
 
 
 class Io:
-    """A pass's ports during `execute`: `io["depth"]` is a resource; `io.program(...)` knows the inputs' defines.
+    """A pass's ports while it executes: `io["depth"]` is a resource, `io.program(...)` knows the ports' defines.
 
-    written: each (pass, port) of the plan as its writer declares it. state: the pass's `State`, which the pass changes
-    as it likes and finds again in the next frame. What a run publishes: counters, of its work; figures, of what its
-    outputs hold; again: whether the next frame must run the pass even if nothing that it is made of changes.
+    written: each (pass, port) of the plan as its writer declares it. state: the pass's `State`, which it changes as it
+    likes and finds again in the next frame. A run publishes counters of its work, figures of what its outputs hold, and
+    `again`: whether the next frame must run the pass even if nothing changes that its outputs follow from.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class Io:
         return self._ports[port]
 
     def meta(self, port: str, kind: type[Meta]) -> Meta:
-        """Return what the writer of the input `port`, which is connected, says of it: its `Output.meta`, a `kind`."""
+        """Return the `Output.meta`, of type `kind`, of the output that is connected to the input `port`."""
         found = self.metas[port]
         if not isinstance(found, kind):
             raise TypeError(f"{self.step.name}.{port}: carries {type(found).__name__}, and {kind.__name__} is wanted")
@@ -136,7 +136,7 @@ class Io:
         self.state = new_state(self.step.work)
 
     def count(self, name: str, value: int) -> None:
-        """Publish how much work this run did, such as the number of maps drawn; none where the pass is not run."""
+        """Publish how much work this run did, such as the number of maps drawn; none if the pass is skipped."""
         self.counters[name] += value
 
     def report(self, name: str, value: int) -> None:

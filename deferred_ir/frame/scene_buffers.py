@@ -1,4 +1,4 @@
-"""A scene on the GPU: vertices, faces, materials and textures, uploaded once; of moving models what moves, again."""
+"""A scene on the GPU: vertices, faces, materials and textures, uploaded once; moving models are updated."""
 
 from __future__ import annotations
 
@@ -26,16 +26,15 @@ FACES, MATERIALS = 0, 1
 ALBEDO_TEXTURE = 15
 """Texture unit of `albedo_texture`; inputs of passes count up from 0, and GL promises 16 units."""
 OWN = "own"
-"""Key of the scene's own triangles in clusters, among those of stand-ins."""
+"""Key of the scene's own clusters, among those of stand-in meshes."""
 
 
 class SceneBuffers:
-    """Indexed triangles with what shaders read of each face.
+    """Indexed triangles, and what shaders read of each face.
 
     has_normals: whether there are normals at vertices. defines: tell shaders what there is of attributes,
     materials and textures, so that they have no code for the rest.
-    general: there are normals and texture coordinates in any case, with values that change nothing, and shaders are
-    those for any scene.
+    general: add neutral normals and texture coordinates where the scene has none, so that its shaders fit any scene.
     """
 
     def __init__(self, gpu: Gpu, scene: Scene, *, general: bool = False) -> None:
@@ -49,7 +48,7 @@ class SceneBuffers:
             # interpolated 1 is not quite 1.
             neutral = {"normal": np.zeros((count, 3)), "uv": np.zeros((count, 2))}
             arrays |= {name: array for name, array in neutral.items() if arrays[name] is None}
-        self._ranges = _ranges(scene)
+        self._ranges = _find_ranges(scene)
         self.has_normals = arrays["normal"] is not None
         self.defines = {
             "HAS_NORMALS": int(self.has_normals),
@@ -65,7 +64,7 @@ class SceneBuffers:
             if array is not None
         }
         self._indices = ctx.buffer(np.ascontiguousarray(g.faces, "u4").tobytes())
-        faces = _face_records(g, slice(None))
+        faces = _pack_faces(g, slice(None))
         materials = np.array([(*material.albedo, 0) for material in scene.materials], "f4")
         self._faces, self._materials = ctx.buffer(faces.tobytes()), ctx.buffer(materials.tobytes())
         gpu.gl.check(f"scene '{scene.name}' with {len(g.faces)} triangles")
@@ -78,12 +77,12 @@ class SceneBuffers:
 
     @property
     def buffer_bytes(self) -> int:
-        """Bytes of all buffers, those of clusters too once there are some."""
+        """Bytes of all buffers, including those of clusters once they exist."""
         return sum(buffer.size for buffer in self._buffers) + sum(mesh.nbytes for mesh in self._clustered.values())
 
     @property
     def owners(self) -> list[Any]:
-        """Under what programs keep vertex arrays for this scene."""
+        """Keys under which programs hold vertex arrays for this scene."""
         return [self, *self._clustered.values()]
 
     @cached_property
@@ -98,7 +97,7 @@ class SceneBuffers:
 
     @property
     def cluster_buffers(self) -> ClusterBuffers:
-        """The scene's triangles in clusters, made when first drawn so."""
+        """The scene's triangles in clusters, made when first asked for."""
         if OWN not in self._clustered:
             self._clustered[OWN] = ClusterBuffers(self.gpu, self._own, self._attributes["position"][0])
         return self._clustered[OWN]
@@ -106,10 +105,9 @@ class SceneBuffers:
     def stand_in(
         self, key: Hashable, make: Callable[[], MapMesh], cluster: Callable[[MapMesh], Clusters] = MapMesh.clustered
     ) -> ClusterBuffers:
-        """Another mesh that is drawn in the scene's place, in clusters, kept by `key` until the scene goes.
+        """Return another mesh to draw instead of the scene, in clusters, which is cached by `key` as long as the scene.
 
-        make: gives it, with as many moving models as the scene; cluster: groups it. Both are called for the first draw
-        only.
+        make: builds it, with as many moving models as the scene; cluster: groups its triangles. Both are called once.
         """
         if key not in self._clustered:
             mesh, poses = make(), self._geometry.poses
@@ -121,17 +119,17 @@ class SceneBuffers:
         return self._clustered[key]
 
     def move(self, geometry: Geometry) -> None:
-        """Bring moving models to where `geometry`, posed from the same rest, has them; the rest is not touched."""
+        """Move models to where `geometry`, which has the same rest, has them; nothing else is uploaded."""
         self._geometry = geometry
         for number in np.flatnonzero((geometry.poses != self._poses).any(axis=(1, 2))).tolist():
-            self._poses[number] = np.nan  # as long as not all is there: a move that is broken off is done again
+            self._poses[number] = np.nan  # until all is uploaded: a move that fails midway is repeated
             vertices = geometry.moving[number].vertices
             for name, array in (("position", geometry.positions), ("normal", geometry.normals)):
                 if array is not None:
                     part = np.ascontiguousarray(array[vertices], "f4")
                     self._attributes[name][0].write(part.tobytes(), offset=12 * vertices.start)
-            for faces in _runs(geometry.faces_of_models[number]):
-                self._faces.write(_face_records(geometry, faces).tobytes(), offset=16 * faces.start)
+            for faces in _group_runs(geometry.faces_of_models[number]):
+                self._faces.write(_pack_faces(geometry, faces).tobytes(), offset=16 * faces.start)
             if "_own" in self.__dict__:
                 self._own.move(number, geometry.poses[number])
             for mesh in (mesh for key, mesh in self._clustered.items() if key != OWN):
@@ -154,12 +152,12 @@ class SceneBuffers:
         return result
 
     def bind(self) -> None:
-        """Make faces and materials visible to shaders."""
+        """Bind faces and materials for shaders."""
         self._faces.bind_to_storage_buffer(FACES)
         self._materials.bind_to_storage_buffer(MATERIALS)
 
     def draw(self, program: Program, instances: int = 1) -> None:
-        """Draw all triangles: in one call, or one a texture where the program samples textures."""
+        """Draw all triangles in one call, or in one for each texture if the program samples textures."""
         array = program.arrays.get(self)
         if array is None:
             attributes = [(*self._attributes[name], name) for name in program.attributes]
@@ -177,7 +175,7 @@ class SceneBuffers:
             array.render(self.gpu.ctx.TRIANGLES, vertices=3 * count, first=3 * first, instances=instances)
 
     def release(self) -> None:
-        """Give everything back. Vertex arrays that programs keep for this scene must go first."""
+        """Delete all buffers and textures. Vertex arrays that programs hold for this scene must go first."""
         for mesh in self._clustered.values():
             mesh.release()
         for buffer in self._buffers:
@@ -186,19 +184,19 @@ class SceneBuffers:
             texture.release()
 
 
-def _face_records(geometry: Geometry, faces: slice) -> Array:
-    """What lib/surface/surface.glsl reads of faces: normal and material's number, float32 (n, 4)."""
+def _pack_faces(geometry: Geometry, faces: slice) -> Array:
+    """Pack faces for lib/surface/surface.glsl: normal and number of the material, float32 (n, 4)."""
     return np.column_stack([geometry.face_normals[faces], geometry.face_materials[faces]]).astype("f4")
 
 
-def _runs(numbers: Ints) -> list[slice]:
-    """Ascending numbers (n,) as ranges without a gap."""
+def _group_runs(numbers: Ints) -> list[slice]:
+    """Group ascending numbers (n,) into ranges without gaps."""
     parts = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
     return [slice(int(part[0]), int(part[-1]) + 1) for part in parts if len(part)]
 
 
-def _ranges(scene: Scene) -> list[tuple[int | None, int, int]]:
-    """(texture, first face, count) of each run of faces with one texture; loading sorts faces by texture."""
+def _find_ranges(scene: Scene) -> list[tuple[int | None, int, int]]:
+    """Return (texture, first face, count) of each run of faces with one texture; loading sorts faces by texture."""
     textures = np.array([-1 if m.texture is None else m.texture for m in scene.materials])
     of_face = textures[scene.geometry.face_materials]
     starts = np.flatnonzero(np.diff(of_face, prepend=of_face[0] - 1))

@@ -11,10 +11,10 @@ from deferred_ir.graph.ports import Buffer
 
 
 class GpuBuffer:
-    """A buffer of records that a pass writes from the CPU; `records` is what it wrote last.
+    """A buffer of records that a pass writes on the CPU; `records` are the last ones.
 
-    versions: a number for each record; as long as it is the same, so is what is drawn for that record. None: unknown.
-    version: another number whenever what it holds has changed.
+    versions: a number for each record, the same as long as what is drawn for that record is; None if unknown. version:
+    a process-wide unique number, a new one whenever the buffer's contents change.
     """
 
     def __init__(self, gpu: Gpu, description: Buffer) -> None:
@@ -23,7 +23,7 @@ class GpuBuffer:
         self.buffer = gpu.ctx.buffer(reserve=self.nbytes, dynamic=True)
         gpu.gl.check(f"buffer of {description}")
         self.records: np.ndarray = np.zeros(0)
-        self._held: tuple[bytes, bytes | None] = b"", None
+        self._contents: tuple[bytes, bytes | None] = b"", None
         self.versions: Ints | None = None
         self.version = new_version()
 
@@ -31,18 +31,18 @@ class GpuBuffer:
         """Replace the first len(records) records."""
         if len(records) > self.description.records or records.itemsize != self.description.stride:
             raise ValueError(f"{len(records)} records of {records.itemsize} bytes into a buffer of {self.description}")
-        held = records.tobytes(), None if versions is None else versions.tobytes()
+        contents = records.tobytes(), None if versions is None else versions.tobytes()
         self.records, self.versions = records, versions
-        self.buffer.write(held[0])
-        if held != self._held:
+        self.buffer.write(contents[0])
+        if contents != self._contents:
             self.version = new_version()
-        self._held = held  # last: a write that is broken off is none, and must be new when it is done again
+        self._contents = contents  # last: after a write that fails, the next one counts as a change
 
     def bind_uniform(self, binding: int, block: int) -> None:
-        """Make block number `block` of the records visible as a uniform block."""
+        """Bind block number `block` of the records as a uniform block."""
         nbytes = self.description.block * self.description.stride
         self.buffer.bind_to_uniform_block(binding, offset=block * nbytes, size=nbytes)
 
     def release(self) -> None:
-        """Give the buffer back."""
+        """Delete the buffer."""
         self.buffer.release()

@@ -1,4 +1,4 @@
-"""One OpenGL context with what every user of it needs: moderngl's view, the raw functions, limits and samplers."""
+"""An OpenGL context: moderngl's object for it, the raw functions, limits, samplers and state that passes share."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from deferred_ir.gl.devices import Loader
 class Gpu:
     """A context on a device (see devices.create_context), current in the thread that made it. Close it when done.
 
-    window: the context of a window, which is current, instead of a headless one; closing leaves it to the window.
+    window: use the context of this window, which is current, instead of a headless one; closing does not destroy it.
     """
 
     def __init__(self, device: str = "auto", window: Loader | None = None) -> None:
@@ -46,11 +46,11 @@ class Gpu:
 
     @property
     def defines(self) -> dict[str, int]:
-        """What every shader must know of the driver."""
+        """Defines that tell shaders what the driver can do."""
         return {"CLIP_CONTROL": int(self.clip_control), "LAYER_FROM_VERTEX": int(self.layer_from_vertex)}
 
     def sampler(self, linear: bool, compare: str | None = None, repeat: bool = False) -> Any:
-        """A sampler object, shared: filter and comparison belong to the reader, never to the texture."""
+        """Return a shared sampler object: filter and comparison belong to the reader, never to the texture."""
         key = (linear, compare, repeat)
         if key not in self._samplers:
             name = self.ctx.LINEAR if linear else self.ctx.NEAREST
@@ -61,7 +61,7 @@ class Gpu:
         return self._samplers[key]
 
     def reset(self) -> None:
-        """The state that each pass starts from: no tests, no clipping, no blending, all writes on."""
+        """Set the state that each pass starts from: no tests, no clipping, no blending, all writes on."""
         ctx = self.ctx
         ctx.disable(ctx.DEPTH_TEST | ctx.CULL_FACE | ctx.BLEND)
         self.clip(0)
@@ -70,7 +70,7 @@ class Gpu:
         self.gl.ColorMask(1, 1, 1, 1)
 
     def scissor(self, rectangle: tuple[int, int, int, int] | None) -> None:
-        """Draw into x, y, width, height alone, or everywhere again."""
+        """Restrict drawing to x, y, width, height; None lifts the restriction."""
         if rectangle is None:
             self.ctx.disable_direct(raw.SCISSOR_TEST)
         else:
@@ -78,7 +78,7 @@ class Gpu:
             self.gl.Scissor(*rectangle)
 
     def uniforms(self, data: bytes) -> Any:
-        """A buffer that begins with `data`, until the next call; `free_uniforms` gives it back."""
+        """Return a buffer that begins with `data` until the next call; `free_uniforms` deletes it."""
         if self._uniforms is None:
             self._uniforms = self.ctx.buffer(reserve=len(data), dynamic=True)
         self._uniforms.orphan(max(len(data), self._uniforms.size))
@@ -86,36 +86,36 @@ class Gpu:
         return self._uniforms
 
     def free_uniforms(self) -> None:
-        """Give that buffer back, if there is one."""
+        """Delete the buffer of `uniforms`, if there is one."""
         if self._uniforms is not None:
             self._uniforms.release()
             self._uniforms = None
 
     @property
     def nbytes(self) -> int:
-        """Of that buffer."""
+        """Size of the buffer of `uniforms`."""
         return self._uniforms.size if self._uniforms else 0
 
     def barrier(self) -> None:
-        """Let later draws, uploads and reads see what shaders stored into images so far."""
+        """Make what shaders have stored into images visible to later draws, uploads and reads."""
         self.gl.MemoryBarrier(
             raw.IMAGE_ACCESS_BARRIER | raw.TEXTURE_FETCH_BARRIER | raw.TEXTURE_UPDATE_BARRIER | raw.FRAMEBUFFER_BARRIER
         )
 
     def check(self, where: str) -> None:
-        """With debug output on (DEFERRED_IR_DEBUG): raise DeviceError if OpenGL has complained."""
+        """With debug output on (DEFERRED_IR_DEBUG): raise DeviceError for faults that OpenGL has reported."""
         if self.gl.debug:
             self.gl.debug.check(where)
 
     def clip(self, count: int) -> None:
-        """Clip by the first `count` of gl_ClipDistance, and by no other."""
+        """Clip by the first `count` of gl_ClipDistance, and by none of the others."""
         for side in range(min(count, self._clipped), max(count, self._clipped)):
             (self.ctx.enable_direct if count > side else self.ctx.disable_direct)(raw.CLIP_DISTANCE0 + side)
         self._clipped = count
 
     def close(self) -> None:
-        """Destroy the context and all that lives in it; a window's own is left to the window."""
-        with self.ctx:  # names mean something else in whichever context is current
+        """Destroy the context and all that lives in it; a window's context is left to the window."""
+        with self.ctx:  # in another current context the same names are other objects
             for sampler in self._samplers.values():
                 sampler.release()
             self.free_uniforms()

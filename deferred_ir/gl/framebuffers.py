@@ -20,7 +20,7 @@ class Target(Protocol):
 
 
 class Framebuffer:
-    """The textures a pass draws into: colours in the order given, at most one depth. Arrays are attached whole."""
+    """Textures to draw into: colours in the order given, and at most one depth. All layers of arrays are attached."""
 
     def __init__(self, gpu: Gpu, textures: Mapping[str, Target], name: str) -> None:
         self.gpu, self._textures, self._name = gpu, textures, name
@@ -30,7 +30,7 @@ class Framebuffer:
         self.attach()
 
     def attach(self) -> None:
-        """Attach its textures as they are now, and bind it."""
+        """Attach its textures, which may have been allocated anew, and bind it."""
         gl, textures = self.gpu.gl, self._textures
         gl.BindFramebuffer(raw.FRAMEBUFFER, self.glo)
         for i, color in enumerate(self.colors):
@@ -46,7 +46,7 @@ class Framebuffer:
             raise ValueError(f"{self._name}: framebuffer incomplete (0x{status:04x}): outputs differ in size or layers")
 
     def bind(self) -> None:
-        """Draw into it from now on, over its whole size."""
+        """Bind it, with a viewport over its whole size."""
         self.gpu.gl.BindFramebuffer(raw.FRAMEBUFFER, self.glo)
         self.gpu.gl.Viewport(0, 0, *self.size)
 
@@ -62,5 +62,5 @@ class Framebuffer:
         self.gpu.gl.ClearBufferfv(raw.DEPTH, 0, (ctypes.c_float * 1)(value))
 
     def release(self) -> None:
-        """Give the framebuffer back; its textures stay."""
+        """Delete the framebuffer; its textures stay."""
         self.gpu.gl.delete("DeleteFramebuffers", self.glo)

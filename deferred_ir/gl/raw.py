@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 _U, _I, _F, _P = ctypes.c_uint, ctypes.c_int, ctypes.c_float, ctypes.c_void_p
 KINDS = "Texture", "Buffer", "Program", "VertexArray", "Framebuffer", "Sampler", "Query"
-"""Of objects that are counted."""
+"""Kinds of objects that `GL.count_objects` counts."""
 HIGHEST = 1 << 17
-"""Names of objects are small numbers, though drivers may count on: beyond it none is looked for."""
+"""Objects are looked for by names below this. They are small numbers, though drivers may count on."""
 _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "ActiveTexture": (None, _U),
     "BindFramebuffer": (None, _U, _U),
@@ -68,7 +68,7 @@ CLIP_DISTANCE0, SCISSOR_TEST = 0x3000, 0x0C11
 MAX_TEXTURE_SIZE, MAX_ARRAY_LAYERS, MAX_VIEWPORT_DIMS = 0x0D33, 0x88FF, 0x0D3A
 TEXTURE_WIDTH, TEXTURE_HEIGHT, TEXTURE_DEPTH = 0x1000, 0x1001, 0x8071
 TEXTURE_BITS = 0x805C, 0x805D, 0x805E, 0x805F, 0x884A
-"""Of red, green, blue, alpha and depth."""
+"""Sizes of red, green, blue, alpha and depth."""
 RGBA32F, RGBA16F, RGBA16, RGBA8, R32F = 0x8814, 0x881A, 0x805B, 0x8058, 0x822E
 RG32UI, R32UI, DEPTH_COMPONENT32F = 0x823C, 0x8236, 0x8CAC
 RGBA, RGB, RED, DEPTH_COMPONENT, RG_INTEGER, RED_INTEGER = 0x1908, 0x1907, 0x1903, 0x1902, 0x8228, 0x8D94
@@ -86,7 +86,7 @@ TEXTURE_FETCH_BARRIER, IMAGE_ACCESS_BARRIER, TEXTURE_UPDATE_BARRIER, FRAMEBUFFER
 OUT_OF_MEMORY, CONTEXT_LOST = 0x0505, 0x0507
 DEBUG_OUTPUT, DEBUG_OUTPUT_SYNCHRONOUS, DEBUG_SOURCE_API = 0x92E0, 0x8242, 0x8246
 DEBUG_FAULTS = 0x824C, 0x824D, 0x824E
-"""Types of messages: errors, deprecated and undefined behaviour."""
+"""Types of messages that are faults: errors, deprecated and undefined behaviour."""
 
 
 class GL:
@@ -110,27 +110,27 @@ class GL:
         return function
 
     def debug_callback(self, function: Callable[..., None]) -> Any:
-        """`function` as DebugMessageCallback takes it; keep what is returned as long as OpenGL may call it."""
+        """Convert `function` for DebugMessageCallback; hold a reference to the result as long as OpenGL may call it."""
         return self._type(None, _U, _U, _U, _U, _I, ctypes.c_char_p, _P)(function)
 
     def make(self, function: str) -> int:
-        """One new name from GenTextures, GenFramebuffers or GenQueries."""
+        """Return a new name from GenTextures, GenFramebuffers or GenQueries."""
         name = _U()
         getattr(self, function)(1, ctypes.byref(name))
         return name.value
 
     def delete(self, function: str, name: int) -> None:
-        """Give a name back through DeleteTextures, DeleteFramebuffers or DeleteQueries."""
+        """Delete a name by DeleteTextures, DeleteFramebuffers or DeleteQueries."""
         getattr(self, function)(1, ctypes.byref(_U(name)))
 
     def integers(self, what: int, count: int = 1) -> list[int]:
-        """`count` values of glGetIntegerv."""
+        """Return `count` values of glGetIntegerv."""
         values = (_I * count)()
         self.GetIntegerv(what, values)
         return list(values)
 
-    def objects(self) -> dict[str, int]:
-        """How many objects of each kind the context has, as OpenGL knows them."""
+    def count_objects(self) -> dict[str, int]:
+        """Count the context's objects of each of KINDS."""
         return {kind: sum(map(getattr(self, f"Is{kind}"), range(1, HIGHEST))) for kind in KINDS}
 
     def check(self, doing: str) -> None:

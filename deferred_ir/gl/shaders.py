@@ -24,7 +24,7 @@ STAGES = {
     ".geom": "geometry_shader",
     ".frag": "fragment_shader",
 }
-"""moderngl's name of the stage that a file is, by its suffix."""
+"""moderngl's name of a file's stage, by its suffix."""
 FULLSCREEN = "fullscreen.vert"
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _SUFFIXES = {*STAGES, ".glsl"}
@@ -84,7 +84,7 @@ def flatten(name: str, folders: Iterable[Path], defines: Mapping[str, int | floa
 
 
 class Program:
-    """A linked program. `name` is its first file's; vertex arrays that fit it are kept in `arrays`."""
+    """A linked program. name: of its first file. arrays: the vertex arrays made for it, by what they draw."""
 
     def __init__(self, gpu: Gpu, name: str, glsl: Any, sources: Iterable[Source]) -> None:
         self.gpu, self.name, self.glsl = gpu, name, glsl
@@ -98,7 +98,7 @@ class Program:
         self.samplers = frozenset(key for key, m in self._uniforms.items() if m.gl_type in raw.SAMPLERS)
 
     def set(self, **values: Any) -> None:
-        """Set uniforms. One that this variant of the shader does not use is passed over; an unknown one is an error."""
+        """Set uniforms. Those that this variant of the shader does not use are ignored; an unknown one is an error."""
         for key, value in values.items():
             uniform = self._uniforms.get(key)
             if uniform is not None:
@@ -111,13 +111,13 @@ class Program:
         return name in self._uniforms
 
     def draw_fullscreen(self) -> None:
-        """One triangle over the whole target; fullscreen.vert makes its corners."""
+        """Draw one triangle over the whole target; fullscreen.vert computes its corners."""
         if None not in self.arrays:
             self.arrays[None] = self.gpu.ctx.vertex_array(self.glsl, [])
         self.arrays[None].render(self.gpu.ctx.TRIANGLES, vertices=3)
 
     def release(self) -> None:
-        """Give the program and its vertex arrays back."""
+        """Delete the program and its vertex arrays."""
         for array in self.arrays.values():
             array.release()
         self.glsl.release()
@@ -178,7 +178,7 @@ class ShaderLibrary:
                 words[files, folder] = _words(sources)
                 key = _key(files, folder, asked, words[files, folder])
                 if key in programs:
-                    continue  # the files no longer name what told the two apart
+                    continue  # the files no longer name the defines in which the two differ
                 changed = "".join(source.text for source in sources.values()) != program.text
                 programs[key] = self._build(files[0], sources) if changed else program
                 defines[key] = asked
@@ -193,27 +193,27 @@ class ShaderLibrary:
         return bool(fresh)
 
     def forget(self, key: Any) -> None:
-        """Give the vertex arrays back that programs keep for `key`, which is going away."""
+        """Delete the vertex arrays that programs hold for `key`, which is going away."""
         for program in self._programs.values():
             if key in program.arrays:
                 program.arrays.pop(key).release()
 
     def release(self) -> None:
-        """Give all programs back."""
+        """Delete all programs."""
         for program in self._programs.values():
             program.release()
         self._programs.clear()
 
 
 def _sources(files: Iterable[str], defines: Mapping[str, Any], folder: Path | None) -> dict[str, Source]:
-    """The flattened shader of each stage."""
+    """Read the flattened shader of each stage."""
     folders = [package_shaders()] if folder is None else [folder, package_shaders()]
     stages = {"vertex_shader": FULLSCREEN, **{STAGES[Path(file).suffix]: file for file in files}}
     return {stage: flatten(file, folders, defines) for stage, file in stages.items()}
 
 
 def _words(sources: Mapping[str, Source]) -> frozenset[str]:
-    """All words in the files of a program."""
+    """Return all words in the files of a program."""
     return frozenset().union(*(source.words for source in sources.values()))
 
 
@@ -222,7 +222,7 @@ def _key(files: tuple[str, ...], folder: Path | None, defines: Mapping[str, int 
 
 
 def _locate(message: str, sources: Mapping[str, Source], name: str) -> str:
-    """The driver's first error in one line, with the file and line it is about."""
+    """Return the driver's first error in one line, with the file and line it is about."""
     stage = next((stage for stage in sources if f"\n{stage}\n" in message), None)
     found = [(line, text) for line, text in _MESSAGE.findall(message) if not text.startswith("warning")]
     if stage is None or not found:

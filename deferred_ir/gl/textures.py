@@ -17,14 +17,14 @@ from deferred_ir.gl.framebuffers import Framebuffer
 from deferred_ir.graph.ports import Texture
 
 SCRATCH_UNIT = 31
-"""Texture unit in which textures are filled and read, so that those bound for a pass stay: their units end at 15."""
+"""Texture unit for filling and reading textures, beyond those of passes, which end at 15 and so stay bound."""
 
 
 class GpuTexture:
-    """A 2D texture or array of one level. `size` is (width, height), `layers` how many an array has now, else 0.
+    """A 2D texture or array texture of one level. size: (width, height). layers: of an array, at present; else 0.
 
-    nbytes: what the driver has allocated for its texels. version: another number whenever something was written into
-    it, unlike that of any other texture or buffer.
+    nbytes: what the driver has allocated for its texels. version: a process-wide unique number, a new one whenever
+    something was written into it.
     """
 
     def __init__(self, gpu: Gpu, description: Texture, size: tuple[int, int]) -> None:
@@ -34,7 +34,7 @@ class GpuTexture:
         self._allocate(min(description.layers, 1) if description.grows else description.layers)
 
     def _allocate(self, layers: int) -> None:
-        """Have OpenGL make it."""
+        """Create the texture in OpenGL."""
         gl, self.layers = self.gpu.gl, layers
         self.touch()
         self.glo = gl.make("GenTextures")
@@ -49,24 +49,24 @@ class GpuTexture:
         except DeviceError:
             self.release()
             raise
-        self.nbytes = self.measured()
+        self.nbytes = self.measure()
 
-    def measured(self) -> int:
-        """Its size by what the driver says that it has allocated, bytes."""
+    def measure(self) -> int:
+        """Return the bytes that the driver says it has allocated."""
         self._bind_to_work()
 
-        def asked(what: int) -> int:
+        def parameter(name: int) -> int:
             value = ctypes.c_int()
-            self.gpu.gl.GetTexLevelParameteriv(self.target, 0, what, ctypes.byref(value))
+            self.gpu.gl.GetTexLevelParameteriv(self.target, 0, name, ctypes.byref(value))
             return value.value
 
-        bits = sum(asked(what) for what in raw.TEXTURE_BITS)
-        return asked(raw.TEXTURE_WIDTH) * asked(raw.TEXTURE_HEIGHT) * asked(raw.TEXTURE_DEPTH) * bits // 8
+        bits = sum(parameter(name) for name in raw.TEXTURE_BITS)
+        return parameter(raw.TEXTURE_WIDTH) * parameter(raw.TEXTURE_HEIGHT) * parameter(raw.TEXTURE_DEPTH) * bits // 8
 
     def fit(self, layers: int) -> bool:
-        """Have `layers` layers, or up to twice as many if it has them; whether it was made anew for that.
+        """Make room for `layers` layers; up to twice as many are fine. Returns whether it was allocated anew for that.
 
-        Then it holds nothing, and is to be attached again (`Framebuffer.attach`).
+        Then its contents are undefined, and it has to be attached again (`Framebuffer.attach`).
         """
         if layers <= self.layers <= 2 * layers:
             return False
@@ -79,7 +79,7 @@ class GpuTexture:
         return True
 
     def touch(self) -> None:
-        """Note that something else was written into it."""
+        """Take a new version: something was written into it."""
         self.version = new_version()
 
     def upload(self, pixels: Any) -> None:
@@ -95,7 +95,7 @@ class GpuTexture:
             gl.TexSubImage2D(self.target, 0, 0, 0, *self.size, *source)
 
     def _bind_to_work(self) -> None:
-        """Make it the texture that OpenGL's functions for textures act on."""
+        """Bind it in the scratch unit, where OpenGL's texture functions act on it."""
         self.gpu.gl.ActiveTexture(raw.TEXTURE0 + SCRATCH_UNIT)
         self.gpu.gl.BindTexture(self.target, self.glo)
 
@@ -110,7 +110,7 @@ class GpuTexture:
         self.gpu.gl.BindImageTexture(unit, self.glo, 0, 0, 0, raw.READ_WRITE, self.format.internal)
 
     def read(self) -> np.ndarray:
-        """All texels, (H, W, channels) or (layers, H, W, channels), bottom row first."""
+        """Return all texels, (H, W, channels) or (layers, H, W, channels), bottom row first."""
         layers = (self.layers,) if self.layers else ()
         pixels = np.empty((*layers, self.size[1], self.size[0], self.format.channels), self.format.dtype)
         gl = self.gpu.gl
@@ -121,9 +121,9 @@ class GpuTexture:
         return pixels
 
     def fill(self, byte: int) -> None:
-        """Fill it with a byte, in whatever its texels are stored as."""
+        """Set every byte of its texels to `byte`."""
         self.touch()
-        # As floats they would be rounded to what fits; whole numbers of the stored width go in as they are.
+        # Given as floats, values would be rounded; integers of the stored width are copied unchanged.
         texel = (ctypes.c_ubyte * 16)(*[byte] * 16)
         where = (0, 0, 0, 0, *self.size, max(self.layers, 1))
         self.gpu.gl.ClearTexSubImage(self.glo, *where, self.format.layout, self.format.type, texel)
@@ -136,11 +136,11 @@ class GpuTexture:
 
     @cached_property
     def framebuffer(self) -> Framebuffer:
-        """A framebuffer of this texture alone."""
+        """A framebuffer with this texture alone."""
         return Framebuffer(self.gpu, {"texture": self}, str(self.description))
 
     def release(self) -> None:
-        """Give the texture back, and its own framebuffer."""
+        """Delete the texture and its own framebuffer."""
         if "framebuffer" in self.__dict__:
             self.framebuffer.release()
         self.gpu.gl.delete("DeleteTextures", self.glo)

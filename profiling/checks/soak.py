@@ -73,7 +73,7 @@ class Soak:
     def note(self, one: ir.Renderer) -> None:
         """Count objects and memory."""
         with one.gpu.ctx:
-            self.counts.append(Count(self.frames, self.loads, one.gpu.gl.objects(), held()))
+            self.counts.append(Count(self.frames, self.loads, one.gpu.gl.count_objects(), held()))
 
     def compare(self, kind: str, image: ir.Image) -> None:
         """Hold an image against the first of its kind."""

@@ -130,14 +130,14 @@ class Work:
     def of(self, scene, settings):
         """(draws, uploads, new objects) of a frame; programs are objects, too."""
         with self.one.gpu.ctx:
-            before = self.one.gpu.gl.objects()
+            before = self.one.gpu.gl.count_objects()
         if settings != self.settings:
             self.one.configure(set=settings)
             self.settings = settings
         self.draws = self.uploads = 0
         drawn(self.one, scene)
         with self.one.gpu.ctx:
-            after = self.one.gpu.gl.objects()
+            after = self.one.gpu.gl.count_objects()
         return (
             self.draws,
             self.uploads,
@@ -266,9 +266,9 @@ class Watched:
             self.read.add(self.PARTS[name])
         return WatchedScene(self) if name == "scene" else getattr(self.frame, name)
 
-    def surfaces(self, *gbuffer):
+    def read_surfaces(self, *gbuffer):
         self.read.add("camera")
-        return self.frame.surfaces(*gbuffer)
+        return self.frame.read_surfaces(*gbuffer)
 
 
 class WatchedScene:

@@ -21,12 +21,12 @@ from deferred_ir.profiling.checks.soak import ROUND, STRETCH, Count, Soak
 
 
 def test_objects_are_counted_by_opengl(gpu):
-    before = gpu.gl.objects()
+    before = gpu.gl.count_objects()
     texture, buffer = GpuTexture(gpu, Texture("r32f"), (4, 4)), gpu.ctx.buffer(reserve=4)
-    assert gpu.gl.objects() == {**before, "Texture": before["Texture"] + 1, "Buffer": before["Buffer"] + 1}
+    assert gpu.gl.count_objects() == {**before, "Texture": before["Texture"] + 1, "Buffer": before["Buffer"] + 1}
     texture.release()
     buffer.release()
-    assert gpu.gl.objects() == before
+    assert gpu.gl.count_objects() == before
 
 
 def test_two_rounds_leave_nothing_behind(monkeypatch, capsys):

@@ -8,6 +8,7 @@ from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.fullscreen import FullscreenPass
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.facts import Fact, Facts
+from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
@@ -18,6 +19,7 @@ __all__ = [
     "Description",
     "Fact",
     "Facts",
+    "Figure",
     "Frame",
     "FullscreenPass",
     "GraphError",

@@ -97,7 +97,7 @@ class ShadowMaps(Pass):
                 if (drawn & ~curved).any():
                     gpu.clip(4)
                     planar = np.flatnonzero(drawn & ~curved)
-                    mesh.draw(program, mesh.clusters.visible(records[planar]), planar)
+                    mesh.draw(program, mesh.clusters.find_visible(records[planar]), planar)
                 if (drawn & curved).any():
                     paraboloid.draw(mesh, io, self.params, records, drawn & curved, layered=True)
         io.state.remember()

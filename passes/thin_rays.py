@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints
-from deferred_ir.base.parallel import in_order
+from deferred_ir.base.parallel import run_in_order
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_buffer import read_limits, read_vpls
 from deferred_ir.frame.pass_io import Io
@@ -80,7 +80,7 @@ def _irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, pa
         return surfaces.sum_irradiance(scaled, slice(starts[share], starts[share + 1]))
 
     total = np.zeros((len(bits), 3))
-    with closing(in_order(work, tasks)) as results:
+    with closing(run_in_order(work, tasks)) as results:
         for share, part in zip(tasks, results, strict=True):
             total[rows[share]] += part.T
     irradiance: Array = total / geometry.scale**2

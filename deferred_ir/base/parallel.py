@@ -15,7 +15,7 @@ AHEAD = 4
 """Tasks begun for each thread before their results are taken: enough to keep all busy, with few results in memory."""
 
 
-def in_order(
+def run_in_order(
     function: Callable[[Task], Result], tasks: Iterable[Task], threads: int | None = None
 ) -> Generator[Result, None, None]:
     """`function` of each task, one after the other; on `threads` threads, None for as many as the machine has.

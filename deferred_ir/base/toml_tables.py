@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from deferred_ir.base.arrays import Vec3
-from deferred_ir.base.errors import Error, SceneError, did_you_mean, shown
+from deferred_ir.base.errors import Error, SceneError, did_you_mean, format_value
 
 LARGEST = 1e18
 """Larger numbers are refused: their squares would overflow 32-bit floats."""
@@ -95,7 +95,7 @@ class Table:
             return None
         value = self.data[key]
         if not isinstance(value, dict):
-            self.fault(key, f"must be a table, not {shown(value)}")
+            self.fault(key, f"must be a table, not {format_value(value)}")
             return None
         return Table(self.faults, f"{self.name}.{key}" if self.name else key, value, known)
 
@@ -105,7 +105,7 @@ class Table:
             return None
         value = self.data[key]
         if not isinstance(value, str) or not value.strip():
-            self.fault(key, f'must be a string such as "name", not {shown(value)}')
+            self.fault(key, f'must be a string such as "name", not {format_value(value)}')
             return None
         return value
 
@@ -115,7 +115,7 @@ class Table:
             return None
         value = self.data[key]
         if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            self.fault(key, f"must be an integer of 0 or more, not {shown(value)}")
+            self.fault(key, f"must be an integer of 0 or more, not {format_value(value)}")
             return None
         return value
 
@@ -123,7 +123,7 @@ class Table:
         """A finite number."""
         if self._missing(key, needed=False):
             return default
-        value = number(self.data[key])
+        value = check_number(self.data[key])
         if isinstance(value, str):
             self.fault(key, value)
             return default
@@ -133,7 +133,7 @@ class Table:
         """`length` finite numbers."""
         if self._missing(key, needed, f"{length} numbers such as {EXAMPLES[length]}"):
             return None
-        value = vector(self.data[key], length)
+        value = check_vector(self.data[key], length)
         if isinstance(value, str):
             self.fault(key, value)
             return None
@@ -149,15 +149,15 @@ class Table:
         if self._missing("times", needed=True, mend="seconds such as [0, 2]"):
             return None
         raw = self.data["times"]
-        times = vector(raw, len(raw) if isinstance(raw, list) else 1)
+        times = check_vector(raw, len(raw) if isinstance(raw, list) else 1)
         if isinstance(times, str) and isinstance(raw, list):
             self.fault("times", times)
             return None
         if isinstance(times, str) or not times:
-            self.fault("times", f"must be an array of numbers such as [0, 2], not {shown(raw)}")
+            self.fault("times", f"must be an array of numbers such as [0, 2], not {format_value(raw)}")
             return None
         if any(later <= earlier for earlier, later in pairwise(times)):
-            self.fault("times", f"must be ascending, each later than the one before, not {shown(raw)}")
+            self.fault("times", f"must be ascending, each later than the one before, not {format_value(raw)}")
             return None
         return times
 
@@ -167,14 +167,14 @@ class Table:
             return None
         raw = self.data[key]
         if not isinstance(raw, list):
-            self.fault(key, f"must be an array of arrays of {length} numbers, not {shown(raw)}")
+            self.fault(key, f"must be an array of arrays of {length} numbers, not {format_value(raw)}")
             return None
         if times is not None and len(raw) != len(times):
             self.fault(key, f"has {len(raw)} entries but times has {len(times)}; give one for each time")
             return None
         result = []
         for index, item in enumerate(raw):
-            value = vector(item, length)
+            value = check_vector(item, length)
             if isinstance(value, str):
                 self.fault(f"{key}[{index}]", value)
                 return None
@@ -187,24 +187,24 @@ class Table:
         return None if rows is None else tuple((x, y, z) for x, y, z in rows)
 
 
-def number(value: Any) -> float | str:
+def check_number(value: Any) -> float | str:
     """`value` as a float, or what is wrong with it."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        return f"must be a number, not {shown(value)}"
+        return f"must be a number, not {format_value(value)}"
     if isinstance(value, float) and not math.isfinite(value):
         return f"must be finite, not {value}"
     if abs(value) > LARGEST:
-        return f"{shown(value)} is too large for 32-bit floats; keep to {LARGEST:g}"
+        return f"{format_value(value)} is too large for 32-bit floats; keep to {LARGEST:g}"
     return float(value)
 
 
-def vector(value: Any, length: int) -> tuple[float, ...] | str:
+def check_vector(value: Any, length: int) -> tuple[float, ...] | str:
     """`value` as `length` floats, or what is wrong with it."""
     if not isinstance(value, list) or len(value) != length:
-        return f"must be {length} numbers such as {EXAMPLES[length]}, not {shown(value)}"
+        return f"must be {length} numbers such as {EXAMPLES[length]}, not {format_value(value)}"
     result = []
     for item in value:
-        checked = number(item)
+        checked = check_number(item)
         if isinstance(checked, str):
             return checked
         result.append(checked)

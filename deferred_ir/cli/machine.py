@@ -139,9 +139,9 @@ def _split_version(version: str) -> list[int]:
 def _check_rays() -> Check:
     """Trace one ray."""
     try:
-        from deferred_ir.rays.embree import traces_a_ray
+        from deferred_ir.rays.embree import can_trace
 
-        found = traces_a_ray()
+        found = can_trace()
     except (ImportError, DeviceError) as error:
         no_wheel = platform.system() == "Linux" and platform.machine() == "aarch64"
         mend = "no wheel for Linux arm64: render with --vpls 0" if no_wheel else "pip install 'embreex>=4.4'"

@@ -50,7 +50,7 @@ class ClusterBuffers:
 
     def draw_all(self, program: Program, light: np.ndarray) -> None:
         """Draw all clusters for one light, LIGHT records (1,). The program reads `position` alone."""
-        commands = self._each[self.clusters.drawn(light)[0]]
+        commands = self._each[self.clusters.find_drawn(light)[0]]
         commands["instances"] = 1
         self._commands.write(commands.tobytes())
         self._array(program).render_indirect(self._commands, self.gpu.ctx.TRIANGLES, count=len(commands))

@@ -11,7 +11,7 @@ import numpy as np
 from deferred_ir.base.arrays import Vec3
 from deferred_ir.frame.scene_buffers import SceneBuffers
 from deferred_ir.gl.textures import GpuTexture
-from deferred_ir.rays.pixel_surfaces import Surfaces, from_gbuffer
+from deferred_ir.rays.pixel_surfaces import Surfaces, decode_gbuffer
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 
@@ -77,7 +77,7 @@ class Frame:
         key = depth, normals
         if key not in self._surfaces:
             smooth = self.scene.geometry.normals is not None
-            self._surfaces[key] = from_gbuffer(
+            self._surfaces[key] = decode_gbuffer(
                 self.scene.camera, self.near, depth.read()[..., 0], normals.read(), smooth=smooth
             )
         return self._surfaces[key]

@@ -68,9 +68,9 @@ def reaching(records: np.ndarray, clusters: Clusters, camera: Camera, size: tupl
     # As a light's: NDC = dot(d, axis) / dot(d, z).
     view["x_axis"], view["y_axis"], view["z_axis"] = rays / (rays**2).sum(axis=1, keepdims=True)
     margin = MARGIN * (clusters.reach + float(np.abs(camera.position).max()))
-    seen = np.flatnonzero(clusters.within(view, margin=margin)[0])
+    seen = np.flatnonzero(clusters.find_within(view, margin=margin)[0])
     reaches = np.zeros(len(records), bool)
     for some in (seen[::STRIDE], seen):
         left = np.flatnonzero(~reaches)
-        reaches[left] = clusters.within(records[left], margin=margin, only=some).any(axis=1)
+        reaches[left] = clusters.find_within(records[left], margin=margin, only=some).any(axis=1)
     return reaches

@@ -87,8 +87,8 @@ class SceneBuffers:
 
     @cached_property
     def _own(self) -> PosedMesh:
-        mesh = MapMesh.of(self._geometry)
-        return mesh.pose(mesh.clustered(), self._geometry.poses)
+        mesh = MapMesh.from_geometry(self._geometry)
+        return mesh.pose(mesh.make_clusters(), self._geometry.poses)
 
     @property
     def clusters(self) -> Clusters:
@@ -103,7 +103,7 @@ class SceneBuffers:
         return self._clustered[OWN]
 
     def stand_in(
-        self, key: Hashable, make: Callable[[], MapMesh], cluster: Callable[[MapMesh], Clusters] = MapMesh.clustered
+        self, key: Hashable, make: Callable[[], MapMesh], cluster: Callable[[MapMesh], Clusters] = MapMesh.make_clusters
     ) -> ClusterBuffers:
         """Return another mesh to draw instead of the scene, in clusters, which is cached by `key` as long as the scene.
 

@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from deferred_ir.base.errors import GraphError, did_you_mean, shown
+from deferred_ir.base.errors import GraphError, did_you_mean, format_value
 from deferred_ir.base.toml_tables import read_toml
 from deferred_ir.graph import former_names, params
 from deferred_ir.graph.figures import Figure
@@ -227,7 +227,7 @@ def _node(name: str, table: Any, passes: Mapping[str, type[Pass]], faults: list[
         return None
     kind, inputs = table.get("type", name), table.get("inputs", {})
     if not isinstance(kind, str):
-        faults.append(f"passes.{name}.type: is {shown(kind)}, but wants the name of a pass type in quotes")
+        faults.append(f"passes.{name}.type: is {format_value(kind)}, but wants the name of a pass type in quotes")
         return None
     if not isinstance(inputs, dict) or not all(isinstance(source, str) for source in inputs.values()):
         faults.append(f'passes.{name}.inputs: wants {{ port = "pass.port" }}')

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal, get_args, get_type_hints
 
-from deferred_ir.base.errors import did_you_mean, shown
+from deferred_ir.base.errors import did_you_mean, format_value
 
 
 def param(
@@ -67,7 +67,7 @@ class Spec:
         if self._fits(value):
             return None
         hint = did_you_mean(value, self.choices) if isinstance(value, str) and not self.number else ""
-        return f"is {shown(value)}, but wants {self.wants()}" + (hint if "mean" in hint else "")
+        return f"is {format_value(value)}, but wants {self.wants()}" + (hint if "mean" in hint else "")
 
     def _fits(self, value: Any) -> bool:
         if isinstance(value, str):

@@ -34,68 +34,68 @@ VIEW_FROM = np.array([0.55, 0.45, 1.0])
 MARGIN = 1.1
 
 
-def fitted(scene: Scene, camera: bool, spotlight: bool) -> Scene:
+def choose_views(scene: Scene, camera: bool, spotlight: bool) -> Scene:
     """`scene` with its camera and its spotlight replaced by chosen ones, as the two flags say; fills Scene.chosen."""
     if not (camera or spotlight):
         return scene
-    near, reasons = _chosen(recentre(scene.at(0)), camera, spotlight)
+    near, reasons = _choose_by_rays(recentre(scene.at(0)), camera, spotlight)
     by = scene.geometry.centre
     views: dict[str, Any] = {"camera": near.camera, "spotlight": near.spotlight}
     views = {name: translate_view(views[name], by) if any(by) else views[name] for name in reasons}
-    return replace(scene, **views, chosen={name: _plain(views[name], why) for name, why in reasons.items()})
+    return replace(scene, **views, chosen={name: _describe(views[name], why) for name, why in reasons.items()})
 
 
-def _chosen(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scene, dict[str, str]]:
+def _choose_by_rays(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scene, dict[str, str]]:
     """The scene, which lies near the origin, with what was chosen, and why each thing was."""
     from deferred_ir.rays.tracer import Tracer
 
     try:
         tracer = Tracer(scene)
     except DeviceError:
-        return _fitted_to_bounds(scene, camera, spotlight)
+        return _choose_by_bounds(scene, camera, spotlight)
     reasons: dict[str, str] = {}
-    middle = _middle(tracer) if camera else _seen_middle(tracer, scene.camera)
+    middle = _find_room_middle(tracer) if camera else _find_seen_middle(tracer, scene.camera)
     if camera:
-        view = _outside_camera(scene) if middle is None else _inside_camera(tracer, middle)
+        view = _make_outside_camera(scene) if middle is None else _choose_inside_camera(tracer, middle)
         reasons["camera"] = "from outside, framing the whole" if middle is None else "inside, looking across"
         scene = replace(scene, camera=view)
     if spotlight:
-        lights = [_outside_light(scene)] if middle is None else _room_lights(tracer, scene.camera, middle)
-        light, reasons["spotlight"] = _brightest(tracer, scene.camera, lights)
+        lights = [_make_outside_light(scene)] if middle is None else _make_room_lights(tracer, scene.camera, middle)
+        light, reasons["spotlight"] = _choose_light(tracer, scene.camera, lights)
         scene = replace(scene, spotlight=light)
     return scene, reasons
 
 
-def _fitted_to_bounds(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scene, dict[str, str]]:
+def _choose_by_bounds(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scene, dict[str, str]]:
     """The choice where no rays can be traced."""
     reasons = {}
     if camera:
         reasons["camera"] = "from outside, framing the whole: without embreex no rays tell what is inside"
-        scene = replace(scene, camera=_outside_camera(scene))
+        scene = replace(scene, camera=_make_outside_camera(scene))
     if spotlight:
         reasons["spotlight"] = "irradiance of 1 at the middle: without embreex no rays tell what is lit"
-        scene = replace(scene, spotlight=_lit(_outside_light(scene), _distance_squared(scene)))
+        scene = replace(scene, spotlight=_set_emission(_make_outside_light(scene), _square_light_distance(scene)))
     return scene, reasons
 
 
-def _plain(item: Camera | Spotlight, why: str) -> dict[str, Any]:
+def _describe(item: Camera | Spotlight, why: str) -> dict[str, Any]:
     """What JSON can hold of a camera or a spotlight."""
     keys = ("position", "look_at", "up", "fov", "emission", "radius")
     values = {key: getattr(item, key) for key in keys if hasattr(item, key)}
     return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()} | {"why": why}
 
 
-def _vec3(values: Array) -> Vec3:
+def _to_vec3(values: Array) -> Vec3:
     x, y, z = (float(value) for value in values)
     return x, y, z
 
 
-def _unit(vector: Array) -> Array:
+def _normalise(vector: Array) -> Array:
     unit: Array = vector / np.linalg.norm(vector)
     return unit
 
 
-def _sphere(count: int) -> Array:
+def _spread_over_sphere(count: int) -> Array:
     """Directions spread evenly over the sphere (a Fibonacci lattice), float64 (count, 3)."""
     index = np.arange(count) + 0.5
     y = 1 - 2 * index / count
@@ -103,7 +103,7 @@ def _sphere(count: int) -> Array:
     return np.stack([ring * np.cos(angle), y, ring * np.sin(angle)], axis=-1)
 
 
-def _distances(tracer: Tracer, origins: Array, directions: Array) -> tuple[Array, Array]:
+def _measure_distances(tracer: Tracer, origins: Array, directions: Array) -> tuple[Array, Array]:
     """How far rays (n, 3), (n, 3) go (infinite for a miss), and how much the faces they meet look at them (-1 to 1)."""
     hits = tracer.closest(origins, directions)
     way = np.where(hits.hit, np.linalg.norm(hits.position - origins, axis=1), np.inf)
@@ -111,11 +111,11 @@ def _distances(tracer: Tracer, origins: Array, directions: Array) -> tuple[Array
     return way, np.where(hits.hit, facing, 0.0)
 
 
-def _clearances(tracer: Tracer, points: Array) -> Array:
+def _measure_clearances(tracer: Tracer, points: Array) -> Array:
     """How far away the nearer surfaces around `points` (n, 3) are; negative for points that are not inside a room."""
-    directions = _sphere(128)
+    directions = _spread_over_sphere(128)
     origins = np.repeat(points, len(directions), axis=0)
-    way, facing = _distances(tracer, origins, np.tile(directions, (len(points), 1)))
+    way, facing = _measure_distances(tracer, origins, np.tile(directions, (len(points), 1)))
     way, facing = way.reshape(len(points), -1), facing.reshape(len(points), -1)
     hit = np.isfinite(way)
     enclosed = hit.mean(axis=1) >= ENCLOSED
@@ -126,7 +126,7 @@ def _clearances(tracer: Tracer, points: Array) -> Array:
     return clearances
 
 
-def _middle(tracer: Tracer) -> Array | None:
+def _find_room_middle(tracer: Tracer) -> Array | None:
     """The point in the middle of the largest room, or None where nothing is a room.
 
     The middle of the bounding box is tried first; it may lie in a table or a column, so points around it are, too.
@@ -135,39 +135,39 @@ def _middle(tracer: Tracer) -> Array | None:
     steps = np.array([0.5, 0.35, 0.65, 0.2, 0.8])
     grid = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
     points = low + grid * (high - low)
-    clearances = _clearances(tracer, points)
+    clearances = _measure_clearances(tracer, points)
     best = int(np.argmax(clearances))
     return points[best] if clearances[best] > 0 else None
 
 
-def _seen_middle(tracer: Tracer, camera: Camera) -> Array | None:
+def _find_seen_middle(tracer: Tracer, camera: Camera) -> Array | None:
     """The point half way to what a given camera looks at, or None where that is not inside a room."""
     position, forward = np.array(camera.position), camera.axes[2]
-    way, _ = _distances(tracer, position[None], forward[None])
+    way, _ = _measure_distances(tracer, position[None], forward[None])
     if not np.isfinite(way[0]):
         return None
     middle = position + forward * way[0] / 2
-    return middle if _clearances(tracer, middle[None])[0] > 0 else None
+    return middle if _measure_clearances(tracer, middle[None])[0] > 0 else None
 
 
-def _free_way(tracer: Tracer, point: Array, directions: Array) -> Array:
+def _measure_free_way(tracer: Tracer, point: Array, directions: Array) -> Array:
     """How far one can go from `point` along `directions` (n, 3) before a surface, or before leaving the bounds."""
     low, high = tracer.scene.geometry.bounds
     with np.errstate(divide="ignore", invalid="ignore"):
         exits = np.where(directions > 0, (high - point) / directions, (low - point) / directions)
     exits = np.where(directions == 0, np.inf, exits).min(axis=1)
-    way, _ = _distances(tracer, np.tile(point, (len(directions), 1)), directions)
+    way, _ = _measure_distances(tracer, np.tile(point, (len(directions), 1)), directions)
     free: Array = np.minimum(way, exits)
     return free
 
 
-def _inside_camera(tracer: Tracer, middle: Array) -> Camera:
+def _choose_inside_camera(tracer: Tracer, middle: Array) -> Camera:
     """From near a wall, through the middle, in the level direction that shows the most of the room."""
     angles = np.arange(24) * (2 * np.pi / 24)
     forwards = np.stack([np.sin(angles), np.zeros(24), -np.cos(angles)], axis=-1)
-    positions = middle - forwards * 0.9 * _free_way(tracer, middle, -forwards)[:, None]
+    positions = middle - forwards * 0.9 * _measure_free_way(tracer, middle, -forwards)[:, None]
     cameras = [
-        Camera(_vec3(position), _vec3(position + forward * tracer.scene.geometry.diagonal / 4), fov=INSIDE_FOV)
+        Camera(_to_vec3(position), _to_vec3(position + forward * tracer.scene.geometry.diagonal / 4), fov=INSIDE_FOV)
         for position, forward in zip(positions, forwards, strict=True)
     ]
     rays = [camera.rays((12, 12)).reshape(-1, 3) for camera in cameras]
@@ -178,71 +178,77 @@ def _inside_camera(tracer: Tracer, middle: Array) -> Camera:
     return cameras[int(np.argmax(np.median(depths.reshape(24, -1), axis=1)))]
 
 
-def _outside_camera(scene: Scene) -> Camera:
+def _make_outside_camera(scene: Scene) -> Camera:
     """A three-quarter view from above that holds all corners of the bounds, with a margin."""
     low, high = scene.geometry.bounds
     centre = (low + high) / 2
-    towards = _unit(VIEW_FROM)
-    right = _unit(np.cross(UP, towards))
+    towards = _normalise(VIEW_FROM)
+    right = _normalise(np.cross(UP, towards))
     corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3) - centre
     aside = np.maximum(np.abs(corners @ right), np.abs(corners @ np.cross(towards, right)))
     distance = (corners @ towards + MARGIN * aside / np.tan(np.radians(OUTSIDE_FOV) / 2)).max()
-    return Camera(_vec3(centre + towards * distance), _vec3(centre), fov=OUTSIDE_FOV)
+    return Camera(_to_vec3(centre + towards * distance), _to_vec3(centre), fov=OUTSIDE_FOV)
 
 
-def _room_lights(tracer: Tracer, camera: Camera, middle: Array) -> list[Spotlight]:
+def _make_room_lights(tracer: Tracer, camera: Camera, middle: Array) -> list[Spotlight]:
     """Lights at several places in the air, looking down and a little along the camera's view."""
     position, forward = np.array(camera.position), camera.axes[2]
-    way = _free_way(tracer, position, forward[None])[0]
+    way = _measure_free_way(tracer, position, forward[None])[0]
     grounds = [middle, *(position + forward * way * part for part in (0.25, 0.5, 0.75))]
-    aim = _unit(0.3 * forward - UP) if abs(forward[1]) < 0.99 else -UP
+    aim = _normalise(0.3 * forward - UP) if abs(forward[1]) < 0.99 else -UP
     lights = []
     for ground in grounds:
-        height = _free_way(tracer, ground, UP[None])[0]
+        height = _measure_free_way(tracer, ground, UP[None])[0]
         for part in (0.9, 0.6, 0.3):
             place = ground + UP * part * max(height, 0.0)
             lights.append(
-                Spotlight(_vec3(place), _vec3(place + aim * tracer.scene.geometry.diagonal / 4), fov=ROOM_LIGHT_FOV)
+                Spotlight(
+                    _to_vec3(place), _to_vec3(place + aim * tracer.scene.geometry.diagonal / 4), fov=ROOM_LIGHT_FOV
+                )
             )
     return lights
 
 
-def _outside_light(scene: Scene) -> Spotlight:
+def _make_outside_light(scene: Scene) -> Spotlight:
     """Above the camera's side, aimed at the middle, with a cone that covers the bounds."""
     centre, radius = scene.geometry.bounds.mean(axis=0), scene.geometry.diagonal / 2
     side = np.subtract(scene.camera.position, centre) * (1, 0, 1)
     length = np.linalg.norm(side)
     side = side / length if length > 1e-6 * radius else np.array([0.0, 0.0, 1.0])
     left = np.cross(UP, side)
-    direction = _unit(side - 0.5 * left + 1.2 * UP)
+    direction = _normalise(side - 0.5 * left + 1.2 * UP)
     # 3 radii away the bounding sphere fills 39 degrees; at 4/3 of that the soft edge begins outside it.
     fov = 2 * np.degrees(np.arcsin(1 / 3)) * 4 / 3
-    return Spotlight(_vec3(centre + direction * 3 * radius), _vec3(centre), fov=float(fov))
+    return Spotlight(_to_vec3(centre + direction * 3 * radius), _to_vec3(centre), fov=float(fov))
 
 
-def _lit(light: Spotlight, emission: float) -> Spotlight:
+def _set_emission(light: Spotlight, emission: float) -> Spotlight:
     return replace(light, emission=(emission, emission, emission))
 
 
-def _distance_squared(scene: Scene) -> float:
+def _square_light_distance(scene: Scene) -> float:
     return float((3 * scene.geometry.diagonal / 2) ** 2)
 
 
-def _brightest(tracer: Tracer, camera: Camera, lights: list[Spotlight]) -> tuple[Spotlight, str]:
+def _choose_light(tracer: Tracer, camera: Camera, lights: list[Spotlight]) -> tuple[Spotlight, str]:
     """The one of `lights` that lights most of what the camera sees, with E for a mean irradiance of 1, and why.
 
     Where none lights anything, a light at the camera does.
     """
-    lit = _best(tracer, camera, lights)
+    lit = _find_best_light(tracer, camera, lights)
     if lit is not None:
         return lit, "mean direct irradiance of what the camera sees is 1"
-    lit = _best(tracer, camera, [Spotlight(camera.position, camera.look_at, fov=min(1.5 * camera.fov, 170.0))])
+    lit = _find_best_light(
+        tracer, camera, [Spotlight(camera.position, camera.look_at, fov=min(1.5 * camera.fov, 170.0))]
+    )
     if lit is not None:
         return lit, "at the camera, as lights elsewhere reach nothing that it sees; mean irradiance of that is 1"
-    return _lit(lights[0], _distance_squared(tracer.scene)), "the camera sees nothing; E fits the scene's size"
+    return _set_emission(
+        lights[0], _square_light_distance(tracer.scene)
+    ), "the camera sees nothing; E fits the scene's size"
 
 
-def _best(tracer: Tracer, camera: Camera, lights: list[Spotlight]) -> Spotlight | None:
+def _find_best_light(tracer: Tracer, camera: Camera, lights: list[Spotlight]) -> Spotlight | None:
     best, best_spread = None, 0.0
     directions = camera.rays((64, 64)).reshape(-1, 3)
     hits = tracer.closest(np.tile(np.array(camera.position), (len(directions), 1)), directions)
@@ -250,16 +256,16 @@ def _best(tracer: Tracer, camera: Camera, lights: list[Spotlight]) -> Spotlight 
         return None
     points = tracer.lift(hits.position[hits.hit], hits.normal[hits.hit])
     for light in lights:
-        irradiance = _irradiance(tracer, points, hits.shading_normal[hits.hit], light)
+        irradiance = _compute_irradiance(tracer, points, hits.shading_normal[hits.hit], light)
         mean, square = float(irradiance.mean()), float((irradiance**2).mean())
         # 1 for even light, 0 for all of it in one spot.
         spread = mean**2 / square if square > 0 else 0.0
         if spread > best_spread:
-            best, best_spread = _lit(light, 1 / mean), spread
+            best, best_spread = _set_emission(light, 1 / mean), spread
     return best
 
 
-def _irradiance(tracer: Tracer, points: Array, normals: Array, light: Spotlight) -> Array:
+def _compute_irradiance(tracer: Tracer, points: Array, normals: Array, light: Spotlight) -> Array:
     """Direct irradiance (n,) at `points` (n, 3) under `light` with E = 1, shadows included."""
     origin = np.array(light.position)
     way = points - origin

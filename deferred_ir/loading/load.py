@@ -21,7 +21,7 @@ ANY_LIGHT = Spotlight((0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
 
 def builtin_scenes() -> tuple[tuple[str, str], ...]:
     """Name and one-line description of each built-in scene, by name; the description is its file's first comment."""
-    return tuple((path.stem, _description(path)) for path in sorted(_folder().glob("*.toml")))
+    return tuple((path.stem, _read_description(path)) for path in sorted(_find_folder().glob("*.toml")))
 
 
 def load(scene: str | os.PathLike[str]) -> Scene:
@@ -29,11 +29,11 @@ def load(scene: str | os.PathLike[str]) -> Scene:
 
     Raises SceneError: one line that names the file, the key and the mend.
     """
-    path = _found(os.fspath(scene))
+    path = _find_file(os.fspath(scene))
     is_scene_file = path.suffix.lower() == ".toml"
     described = scene_file.read(path) if is_scene_file else SceneFile(path.stem, (ModelEntry(path),))
     read = [
-        (_model(entry, path, index, len(described.models)), entry.motion)
+        (_read_model(entry, path, index, len(described.models)), entry.motion)
         for index, entry in enumerate(described.models)
     ]
     geometry, materials, textures, ranges = merge.merge(read, str(path))
@@ -50,10 +50,10 @@ def load(scene: str | os.PathLike[str]) -> Scene:
         render=described.render,
         notes=notes,
     )
-    return default_views.fitted(result, camera=described.camera is None, spotlight=described.spotlight is None)
+    return default_views.choose_views(result, camera=described.camera is None, spotlight=described.spotlight is None)
 
 
-def _model(entry: ModelEntry, path: Path, index: int, count: int) -> ModelData:
+def _read_model(entry: ModelEntry, path: Path, index: int, count: int) -> ModelData:
     """The model of an entry; an error says which entry of which scene file names it."""
     try:
         return models.read(entry.path, entry.scale, entry.translate, root=path.parent)
@@ -64,22 +64,22 @@ def _model(entry: ModelEntry, path: Path, index: int, count: int) -> ModelData:
         raise SceneError(f"{path}: {key}: {error}") from error
 
 
-def _folder() -> Path:
+def _find_folder() -> Path:
     return Path(str(files("deferred_ir.scenes")))
 
 
-def _description(path: Path) -> str:
+def _read_description(path: Path) -> str:
     for line in path.read_text(encoding="utf-8").splitlines():
         if line.startswith("#"):
             return line.lstrip("# ").strip()
     return ""
 
 
-def _found(name: str) -> Path:
+def _find_file(name: str) -> Path:
     """The file that `name` means; a built-in name wins over a file of that name."""
-    names = [path.stem for path in _folder().glob("*.toml")]
+    names = [path.stem for path in _find_folder().glob("*.toml")]
     if name in names:
-        return _folder() / f"{name}.toml"
+        return _find_folder() / f"{name}.toml"
     path = Path(name)
     if os.path.isdir(name):
         raise SceneError(f"{name}: is a folder; give a scene file or a model in it")

@@ -49,9 +49,9 @@ def merge(
         positions=np.concatenate([part.positions for part in parts]),
         faces=faces[order].astype(np.int32),
         face_materials=np.concatenate(face_materials)[order].astype(np.int32),
-        normals=_joined(parts, lambda part: part.normals, np.zeros(3)),
-        uvs=_joined(parts, lambda part: part.uvs, np.zeros(2)),
-        colors=_joined(parts, lambda part: part.colors, np.ones(3)),
+        normals=_join(parts, lambda part: part.normals, np.zeros(3)),
+        uvs=_join(parts, lambda part: part.uvs, np.zeros(2)),
+        colors=_join(parts, lambda part: part.colors, np.ones(3)),
         moving=tuple(model for model in ranges if model.motion),
     )
     low, high = geometry.bounds
@@ -60,7 +60,7 @@ def merge(
     return geometry, tuple(materials), tuple(texture for _, texture in textures.values()), tuple(ranges)
 
 
-def _joined(parts: list[Part], pick: Callable[[Part], Array | None], filler: Array) -> Array | None:
+def _join(parts: list[Part], pick: Callable[[Part], Array | None], filler: Array) -> Array | None:
     """What `pick` takes of all parts, float32, with rows of `filler` where a part has none; None if no part has any."""
     picked = [pick(part) for part in parts]
     if all(array is None for array in picked):

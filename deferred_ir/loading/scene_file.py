@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.arrays import Vec3
-from deferred_ir.base.errors import SceneError, did_you_mean, shown
+from deferred_ir.base.errors import SceneError, did_you_mean, format_value
 from deferred_ir.base.image_size import parse_size
 from deferred_ir.base.toml_tables import Faults, Table, read_toml
 from deferred_ir.scene.camera import Camera, view_fault
@@ -59,15 +59,17 @@ def read(path: Path) -> SceneFile:
     root = Table(faults, "", data, ("name", "model", "camera", "spotlight", "render"))
     name = root.string("name")
     if name and not NAME.fullmatch(name):
-        root.fault("name", f"{shown(name)}: names pictures; leave slashes, percent and control characters out of it")
-    models = _models(root, path.parent)
-    camera, spotlight, render = _camera(root), _spotlight(root), _render(root, path.parent)
+        root.fault(
+            "name", f"{format_value(name)}: names pictures; leave slashes, percent and control characters out of it"
+        )
+    models = _read_models(root, path.parent)
+    camera, spotlight, render = _read_camera(root), _read_spotlight(root), _read_render(root, path.parent)
     if faults.found:
         faults.fail()
     return SceneFile(name or path.stem, models, camera, spotlight, render)
 
 
-def _models(root: Table, folder: Path) -> tuple[ModelEntry, ...]:
+def _read_models(root: Table, folder: Path) -> tuple[ModelEntry, ...]:
     entries = root.data.get("model")
     if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
         what = "missing" if entries is None else "must be an array of tables"
@@ -82,11 +84,11 @@ def _models(root: Table, folder: Path) -> tuple[ModelEntry, ...]:
         if scale <= 0:
             table.fault("scale", f"must be above 0, not {scale}")
         translate = table.vec3("translate", needed=False) or (0.0, 0.0, 0.0)
-        models.append(ModelEntry(folder / (path or ""), scale, translate, _model_motion(table)))
+        models.append(ModelEntry(folder / (path or ""), scale, translate, _read_model_motion(table)))
     return tuple(models)
 
 
-def _model_motion(model: Table) -> ModelMotion | None:
+def _read_model_motion(model: Table) -> ModelMotion | None:
     table = model.table("motion", ("times", "translations", "rotations"))
     if table is None:
         return None
@@ -108,23 +110,23 @@ def _model_motion(model: Table) -> ModelMotion | None:
     return ModelMotion(times, translations, tuple(rotations))
 
 
-def _camera(root: Table) -> Camera | None:
+def _read_camera(root: Table) -> Camera | None:
     table = root.table("camera", ("position", "look_at", "up", "fov", "motion"))
     if table is None:
         return None
     position, look_at = table.vec3("position"), table.vec3("look_at")
     up = table.vec3("up", needed=False) or (0.0, 1.0, 0.0)
-    fov = _fov(table, Camera.fov)
-    motion = _camera_motion(table, up)
+    fov = _read_fov(table, Camera.fov)
+    motion = _read_camera_motion(table, up)
     if position is None or look_at is None:
         return None
     _check_view(table, "look_at", position, look_at, up)
     return Camera(position, look_at, up, fov, motion)
 
 
-def _camera_motion(camera: Table, up: Vec3) -> CameraMotion | None:
+def _read_camera_motion(camera: Table, up: Vec3) -> CameraMotion | None:
     table = camera.table("motion", ("times", "positions", "look_ats"))
-    path = _keyframes(table) if table else None
+    path = _read_keyframes(table) if table else None
     if table is None or path is None:
         return None
     for index, (position, look_at) in enumerate(zip(path.positions, path.look_ats, strict=True)):
@@ -132,17 +134,17 @@ def _camera_motion(camera: Table, up: Vec3) -> CameraMotion | None:
     return CameraMotion(path.times, path.positions, path.look_ats)
 
 
-def _spotlight(root: Table) -> Spotlight | None:
+def _read_spotlight(root: Table) -> Spotlight | None:
     table = root.table("spotlight", ("position", "look_at", "fov", "emission", "radius", "motion"))
     if table is None:
         return None
     position, look_at, emission = table.vec3("position"), table.vec3("look_at"), table.vec3("emission")
-    fov, radius = _fov(table, Spotlight.fov), table.number("radius", 0.0)
+    fov, radius = _read_fov(table, Spotlight.fov), table.number("radius", 0.0)
     if emission is not None and min(emission) < 0:
-        table.fault("emission", f"must be 0 or more, not {shown(list(emission))}")
+        table.fault("emission", f"must be 0 or more, not {format_value(list(emission))}")
     if radius < 0:
         table.fault("radius", f"must be 0 or more, not {radius}")
-    motion = _spotlight_motion(table)
+    motion = _read_spotlight_motion(table)
     if position is None or look_at is None or emission is None:
         return None
     light = Spotlight(position, look_at, fov, emission, radius, motion)
@@ -151,14 +153,14 @@ def _spotlight(root: Table) -> Spotlight | None:
     return light
 
 
-def _spotlight_motion(spotlight: Table) -> SpotlightMotion | None:
+def _read_spotlight_motion(spotlight: Table) -> SpotlightMotion | None:
     table = spotlight.table("motion", ("kind", "amplitude", "speed", "times", "positions", "look_ats"))
     kind = table.string("kind", needed=True, mend=f"one of {', '.join(KINDS)}") if table else None
     if table is None or kind is None:
         return None
     own = {"lissajous": ("amplitude", "speed"), "keyframes": ("times", "positions", "look_ats")}
     if kind not in own:
-        table.fault("kind", f"unknown motion {shown(kind)}{did_you_mean(kind, KINDS)}")
+        table.fault("kind", f"unknown motion {format_value(kind)}{did_you_mean(kind, KINDS)}")
         return None
     for key in table.data:
         if key != "kind" and key not in own[kind] and any(key in keys for keys in own.values()):
@@ -166,7 +168,7 @@ def _spotlight_motion(spotlight: Table) -> SpotlightMotion | None:
     if kind == "lissajous":
         amplitude, speed = table.vec3("amplitude"), table.vector("speed", 2)
         return LissajousMotion(amplitude, (speed[0], speed[1])) if amplitude and speed else None
-    path = _keyframes(table)
+    path = _read_keyframes(table)
     if path is None:
         return None
     for index, (position, look_at) in enumerate(zip(path.positions, path.look_ats, strict=True)):
@@ -174,7 +176,7 @@ def _spotlight_motion(spotlight: Table) -> SpotlightMotion | None:
     return KeyframedSpotlight(path.times, path.positions, path.look_ats)
 
 
-def _keyframes(table: Table) -> ViewKeyframes | None:
+def _read_keyframes(table: Table) -> ViewKeyframes | None:
     """Read times, positions and look_ats of a camera or a spotlight."""
     times = table.times()
     positions, look_ats = table.vec3s("positions", times), table.vec3s("look_ats", times)
@@ -183,7 +185,7 @@ def _keyframes(table: Table) -> ViewKeyframes | None:
     return ViewKeyframes(times, positions, look_ats)
 
 
-def _fov(table: Table, default: float) -> float:
+def _read_fov(table: Table, default: float) -> float:
     fov = table.number("fov", default)
     if not 0 < fov < 180:
         table.fault("fov", f"must lie between 0 and 180 degrees, not {fov}")
@@ -199,17 +201,17 @@ def _check_view(table: Table, key: str, position: Vec3, look_at: Vec3, up: Vec3 
         table.fault(key if "[" in key or name == "look_at" else name, why)
 
 
-def _render(root: Table, folder: Path) -> RenderDefaults:
+def _read_render(root: Table, folder: Path) -> RenderDefaults:
     table = root.table("render", ("graph", "size", "vpls", "seed", "set"))
     if table is None:
         return RenderDefaults()
     graph = table.string("graph")
     if graph is not None and graph.endswith(".toml"):
         graph = str(folder / graph)  # like a model's path, relative to the scene file
-    size = _size(table)
+    size = _read_size(table)
     settings = table.data.get("set", {})
     if not isinstance(settings, dict):
-        table.fault("set", f'must be a table such as {{"tonemap.exposure" = 1.0}}, not {shown(settings)}')
+        table.fault("set", f'must be a table such as {{"tonemap.exposure" = 1.0}}, not {format_value(settings)}')
         settings = {}
     for key, value in settings.items():
         _check_setting(table, key, value)
@@ -220,12 +222,12 @@ def _check_setting(table: Table, key: str, value: Any) -> None:
     if isinstance(value, dict):
         table.fault(f"set.{key}", f'write pass and parameter as one key in quotes: "{key}.parameter" = value')
     elif not re.fullmatch(r"[^.\s]+\.[^.\s]+", key):
-        table.fault(f"set.{shown(key)}", 'must name pass and parameter, such as "tonemap.exposure"')
+        table.fault(f"set.{format_value(key)}", 'must name pass and parameter, such as "tonemap.exposure"')
     elif not isinstance(value, str | int | float) or (isinstance(value, float) and not math.isfinite(value)):
-        table.fault(f"set.{key}", f"must be a string, a finite number, true or false, not {shown(value)}")
+        table.fault(f"set.{key}", f"must be a string, a finite number, true or false, not {format_value(value)}")
 
 
-def _size(table: Table) -> tuple[int, int] | None:
+def _read_size(table: Table) -> tuple[int, int] | None:
     value = table.data.get("size")
     if value is None:
         return None
@@ -235,5 +237,5 @@ def _size(table: Table) -> tuple[int, int] | None:
     else:
         size = parse_size(value) if isinstance(value, str) else None
     if size is None:
-        table.fault("size", f'must be "512x512" or [512, 512], 1 pixel or more, not {shown(value)}')
+        table.fault("size", f'must be "512x512" or [512, 512], 1 pixel or more, not {format_value(value)}')
     return size

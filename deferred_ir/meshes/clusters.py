@@ -31,16 +31,16 @@ class Clusters:
         low, high = corners.min(axis=1), corners.max(axis=1)
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         # Triangles of like size together: one large triangle would make its cluster bend in more maps than its own.
-        classes = _octaves(edges)
+        classes = _classify(edges)
         if groups is not None:
             classes += groups * (OCTAVES + 1)
-        self.order, self.starts = split(low / 2 + high / 2, classes, most)
+        self.order, self.starts = split_points(low / 2 + high / 2, classes, most)
         first = self.starts[:-1]
         self._longest = np.maximum.reduceat(edges[self.order], first)
         self._boxes = np.ones((7, len(first)), np.float32)
-        self._fit(slice(0, len(first)), low[self.order], high[self.order])
+        self._set_boxes(slice(0, len(first)), low[self.order], high[self.order])
 
-    def _fit(self, chosen: slice, low: Array, high: Array) -> None:
+    def _set_boxes(self, chosen: slice, low: Array, high: Array) -> None:
         """Put boxes about the clusters `chosen`; low, high (n, 3): of their faces, in order."""
         at = self.starts[chosen] - self.starts[chosen.start]
         low, high = np.minimum.reduceat(low, at), np.maximum.reduceat(high, at)
@@ -53,7 +53,7 @@ class Clusters:
 
         Triangles have to be what they were, but for a rigid motion.
         """
-        self._fit(chosen, corners.min(axis=1), corners.max(axis=1))
+        self._set_boxes(chosen, corners.min(axis=1), corners.max(axis=1))
 
     def __len__(self) -> int:
         return len(self.starts) - 1
@@ -63,7 +63,7 @@ class Clusters:
         """Triangles of each cluster, int (C,)."""
         return np.diff(self.starts)
 
-    def visible(self, lights: np.ndarray, *, hemisphere: bool = False) -> Bools:
+    def find_visible(self, lights: np.ndarray, *, hemisphere: bool = False) -> Bools:
         """Which clusters may show in the maps of `lights`, LIGHT records (n,): bool (n, C).
 
         A map shows what lies inside its pyramid; with `hemisphere` all that is in front of the light. A cluster that is
@@ -71,9 +71,9 @@ class Clusters:
         """
         if len(self) == 1:
             return np.ones((len(lights), 1), bool)
-        return self.within(lights, hemisphere=hemisphere)
+        return self.find_within(lights, hemisphere=hemisphere)
 
-    def within(
+    def find_within(
         self, lights: np.ndarray, *, hemisphere: bool = False, margin: float = 0.0, only: Ints | slice = EVERY
     ) -> Bools:
         """Which clusters, or which of `only`, may lie in the lights' pyramids or less than `margin` outside: (n, C)."""
@@ -92,11 +92,11 @@ class Clusters:
             outside |= np.column_stack([normal, np.abs(normal), offset]) @ boxes < 0
         return ~outside
 
-    def drawn(self, lights: np.ndarray) -> Bools:
+    def find_drawn(self, lights: np.ndarray) -> Bools:
         """Which clusters make up the scene for each of `lights`, LIGHT records (n,), culled or not: bool (n, C)."""
         return np.ones((len(lights), len(self)), bool)
 
-    def bent(self, lights: np.ndarray, reach: Array) -> Bools:
+    def find_bent(self, lights: np.ndarray, reach: Array) -> Bools:
         """Which clusters have an edge that may be closer to a light than `reach` (n,) times its length: bool (n, C)."""
         centre, half = self._boxes[:3], self._boxes[3:6]
         away = np.maximum(np.abs(lights["position"][:, :, None] - centre) - half, 0)
@@ -104,7 +104,7 @@ class Clusters:
         return bent
 
 
-def _octaves(edges: Array) -> Ints:
+def _classify(edges: Array) -> Ints:
     """Class of each triangle by its longest edge (F,): halves of the longest of all, down to 2^-OCTAVES."""
     longest = edges.max()
     shares = edges / longest if longest > 0 else edges
@@ -112,7 +112,7 @@ def _octaves(edges: Array) -> Ints:
     return classes
 
 
-def split(points: Array, classes: Ints, most: int) -> tuple[Ints, Ints]:
+def split_points(points: Array, classes: Ints, most: int) -> tuple[Ints, Ints]:
     """Halve the `points` (n, 3) of each class across their longest extent until no part has more than `most`.
 
     Returns order (n,) and starts.

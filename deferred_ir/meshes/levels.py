@@ -13,9 +13,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.meshes.clusters import Clusters, split
+from deferred_ir.meshes.clusters import Clusters, split_points
 from deferred_ir.meshes.posed import MapMesh
-from deferred_ir.meshes.simplify import simplify, welded
+from deferred_ir.meshes.simplify import simplify, weld_vertices
 from deferred_ir.scene.geometry import Geometry
 
 CHUNK = 2048
@@ -42,27 +42,27 @@ class Levels:
     boxes: Array
 
 
-def levels(geometry: Geometry) -> Levels:
+def find_levels(geometry: Geometry) -> Levels:
     """The levels of a scene: some seconds for 100,000 triangles, once in a process."""
     if geometry not in _known:
-        _known[geometry] = _made(geometry)
+        _known[geometry] = _build_levels(geometry)
     return _known[geometry]
 
 
-def mesh(geometry: Geometry) -> MapMesh:
+def make_mesh(geometry: Geometry) -> MapMesh:
     """The triangles of all levels."""
-    return replace(MapMesh.of(geometry), faces=levels(geometry).faces)
+    return replace(MapMesh.from_geometry(geometry), faces=find_levels(geometry).faces)
 
 
-def _made(geometry: Geometry) -> Levels:
-    positions = MapMesh.of(geometry).local.astype(np.float32)
+def _build_levels(geometry: Geometry) -> Levels:
+    positions = MapMesh.from_geometry(geometry).local.astype(np.float32)
     faces = np.empty_like(geometry.faces)
     for group in range(1 + len(geometry.moving)):  # what moves apart is not one, where it touches at rest
         own = np.flatnonzero(geometry.groups == group)
-        faces[own] = welded(positions, geometry.faces[own])
+        faces[own] = weld_vertices(positions, geometry.faces[own])
     corners = positions[faces]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    order, starts = split(low / 2 + high / 2, geometry.groups, CHUNK)
+    order, starts = split_points(low / 2 + high / 2, geometry.groups, CHUNK)
     chunk = np.empty(len(faces), np.intp)
     chunk[order] = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
     first, last = np.full(len(positions), len(starts)), np.full(len(positions), -1)
@@ -81,7 +81,7 @@ def _made(geometry: Geometry) -> Levels:
     )
 
 
-class DetailClusters(Clusters):
+class LevelClusters(Clusters):
     """Clusters of all levels; a light draws each chunk at the coarsest level that it may.
 
     tolerance: gives for LIGHT records (n,) how far a level may be off at most, in distances of surface and light, (n,).
@@ -106,11 +106,11 @@ class DetailClusters(Clusters):
         np.minimum.at(low, chunk, corners.min(axis=1))
         np.maximum.at(high, chunk, corners.max(axis=1))
 
-    def visible(self, lights: np.ndarray, *, hemisphere: bool = False) -> Bools:
+    def find_visible(self, lights: np.ndarray, *, hemisphere: bool = False) -> Bools:
         """As in Clusters, of the levels that the lights draw."""
-        return super().visible(lights, hemisphere=hemisphere) & self.drawn(lights)
+        return super().find_visible(lights, hemisphere=hemisphere) & self.find_drawn(lights)
 
-    def drawn(self, lights: np.ndarray) -> Bools:
+    def find_drawn(self, lights: np.ndarray) -> Bools:
         """Which clusters make up the scene for each of `lights`, LIGHT records (n,): bool (n, C)."""
         position = lights["position"][:, None].astype(np.float64)
         low, high = self._chunks

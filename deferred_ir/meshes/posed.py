@@ -34,12 +34,12 @@ class MapMesh:
         return local
 
     @classmethod
-    def of(cls, geometry: Geometry) -> MapMesh:
+    def from_geometry(cls, geometry: Geometry) -> MapMesh:
         """The triangles of a scene."""
         rest = geometry.rest
         return cls(rest.positions, rest.faces, tuple(model.vertices for model in rest.moving))
 
-    def clustered(self) -> Clusters:
+    def make_clusters(self) -> Clusters:
         """In clusters, none with triangles of two models that move apart. Those of moving models have no place yet."""
         return Clusters(self.local, self.faces, groups=self.groups if self.moving else None)
 
@@ -49,7 +49,7 @@ class MapMesh:
 
 
 @dataclass(frozen=True)
-class _Part:
+class _MovingPart:
     """A moving model: its vertices (n, 3) at rest, its clusters, and the corners of their faces, in order, in these."""
 
     rest: Array
@@ -57,7 +57,7 @@ class _Part:
     corners: Ints
 
     @classmethod
-    def of(cls, mesh: MapMesh, clusters: Clusters, number: int) -> _Part:
+    def from_mesh(cls, mesh: MapMesh, clusters: Clusters, number: int) -> _MovingPart:
         vertices, starts = mesh.moving[number], clusters.starts
         whose = mesh.groups[clusters.order[starts[:-1]]]
         first, last = np.searchsorted(whose, (number + 1, number + 2)).tolist()
@@ -70,7 +70,7 @@ class PosedMesh:
 
     def __init__(self, mesh: MapMesh, clusters: Clusters, poses: Array) -> None:
         self.mesh, self.clusters = mesh, clusters
-        self._parts = [_Part.of(mesh, clusters, number) for number in range(len(mesh.moving))]
+        self._parts = [_MovingPart.from_mesh(mesh, clusters, number) for number in range(len(mesh.moving))]
         for number, pose in enumerate(poses):
             self.move(number, pose)
 

@@ -26,7 +26,7 @@ FEW = 0.002
 """A round that moves fewer vertices than this share of the triangles is the last."""
 
 
-def welded(positions: Array, faces: Ints) -> Ints:
+def weld_vertices(positions: Array, faces: Ints) -> Ints:
     """`faces` (F, 3) with each vertex replaced by the first that lies, in float32, at the same place."""
     _, first, place = np.unique(positions.astype(np.float32), axis=0, return_index=True, return_inverse=True)
     result: Ints = first[place.reshape(-1)][faces]

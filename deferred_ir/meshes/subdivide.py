@@ -46,7 +46,7 @@ def subdivide(positions: Array, faces: Ints, longest: float, most: int = MOST) -
     return points, np.concatenate(done)
 
 
-def subdivided(mesh: MapMesh, longest: float) -> MapMesh:
+def subdivide_mesh(mesh: MapMesh, longest: float) -> MapMesh:
     """The same for a mesh, of which what moves apart is split apart."""
     parts = [subdivide(mesh.positions, mesh.faces[mesh.groups == 0], longest)]
     for number, vertices in enumerate(mesh.moving, start=1):

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from deferred_ir.base.errors import SettingError, shown, summarise
+from deferred_ir.base.errors import SettingError, format_value, summarise
 
 
 def metadata_path(path: Path) -> Path:
@@ -31,13 +31,13 @@ def read_metadata(path: Path, size: tuple[int, int]) -> dict[str, Any]:
     if not isinstance(metadata, dict) or "scene_hash" not in metadata:
         return {}
     if not isinstance(metadata["scene_hash"], str):
-        raise SettingError(f"{file}: scene_hash: must be text, not {shown(metadata['scene_hash'])}")
+        raise SettingError(f"{file}: scene_hash: must be text, not {format_value(metadata['scene_hash'])}")
     if metadata.get("size") != list(size):
         raise SettingError(
-            f"{file}: size: is {shown(metadata.get('size'))}, but {path.name} is {size[0]}x{size[1]};"
+            f"{file}: size: is {format_value(metadata.get('size'))}, but {path.name} is {size[0]}x{size[1]};"
             " the two do not belong together"
         )
     hit = metadata.get("hit_fraction")
     if hit is not None and (isinstance(hit, bool) or not isinstance(hit, int | float) or not 0 <= hit <= 1):
-        raise SettingError(f"{file}: hit_fraction: {shown(hit)} is no number from 0 to 1")
+        raise SettingError(f"{file}: hit_fraction: {format_value(hit)} is no number from 0 to 1")
     return metadata

@@ -7,7 +7,7 @@ from contextlib import closing
 import numpy as np
 
 from deferred_ir.base.arrays import Array
-from deferred_ir.base.parallel import in_order
+from deferred_ir.base.parallel import run_in_order
 from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.sampling import pixel_blocks, streams
@@ -20,7 +20,7 @@ PIXELS = 1 << 13
 GOLDEN_ANGLE = np.pi * (3 - 5**0.5)
 
 
-def lit_by(light: Spotlight, tracer: Tracer, at: Hits, rng: np.random.Generator) -> Array:
+def compute_irradiance(light: Spotlight, tracer: Tracer, at: Hits, rng: np.random.Generator) -> Array:
     """Irradiance on surfaces `at` (n, all of them hit) divided by the spotlight's emission, float64 (n,).
 
     A disc light is asked at one random point of its disc for each surface, a point light at its position.
@@ -41,20 +41,20 @@ def trace_spotlight(job: PixelJob, *, samples: int) -> Array:
     tasks = [(i, slice(start, start + PIXELS)) for i, start in enumerate(range(0, len(seen.pixel), PIXELS))]
     dealing = streams.shadow_blocks(seed)
     _, index, cells = pixel_blocks.deal(seen.pixel, width, 1, block, int(dealing.integers(block * block)))
-    shift, grid = dealing.random(2), pixel_blocks.lattice(cells)
+    shift, grid = dealing.random(2), pixel_blocks.find_lattice(cells)
 
     def work(task: tuple[int, slice]) -> Array:
         number, rows = task
         at = seen.rows(rows)
         if light.radius == 0:
             return _arriving(light, tracer, at, None)
-        places = pixel_blocks.jittered(index[rows, 0], grid, streams.shadow_rays(seed, number)) + shift
+        places = pixel_blocks.jitter(index[rows, 0], grid, streams.shadow_rays(seed, number)) + shift
         total = np.zeros(len(at.pixel))
         for i in range(samples):
             total += _arriving(light, tracer, at, _spiral(places % 1, i, samples))
         return total / samples
 
-    with closing(in_order(work, tasks, job.threads)) as results:
+    with closing(run_in_order(work, tasks, job.threads)) as results:
         for (_, rows), part in zip(tasks, results, strict=True):
             image[seen.pixel[rows]] = part
     return image.reshape(height, width)

@@ -22,7 +22,7 @@ SLACK = 1e-5
 
 
 @dataclass(frozen=True)
-class _Body:
+class _MovingModel:
     """A moving model. centre: of its own coordinates, at rest; turn (3, 3), shift (3,): from the world's into these."""
 
     embree: Any
@@ -50,21 +50,21 @@ class _Body:
         return np.flatnonzero(enter <= leave * np.float32(1 + SLACK))
 
 
-class Rays:
+class EmbreeScenes:
     """Asks Embree. Origins and directions are float32 (n, 3); safe in many threads."""
 
     def __init__(self, geometry: Geometry) -> None:
         self._still = np.flatnonzero(geometry.groups == 0) if geometry.moving else None
         faces = geometry.faces if self._still is None else geometry.faces[self._still]
-        self._scene = _embree(geometry.positions, faces)
+        self._scene = _build_scene(geometry.positions, faces)
         rest = geometry.rest
         self._centres, self._models = list[Array](), list[Any]()
         for model, own in zip(rest.moving, rest.faces_of_models, strict=True):
             # In coordinates about its own middle: 32 bits are finest there.
             at = rest.positions[model.vertices]
             self._centres.append(find_middle(at))
-            self._models.append(_embree(at - self._centres[-1], rest.faces[own] - model.first_vertex))
-        self._bodies: list[_Body] = []
+            self._models.append(_build_scene(at - self._centres[-1], rest.faces[own] - model.first_vertex))
+        self._bodies: list[_MovingModel] = []
         self.pose(geometry)
 
     def pose(self, geometry: Geometry) -> None:
@@ -76,7 +76,9 @@ class Rays:
             turn = pose[:3, :3].T
             shift = -turn @ pose[:3, 3] - self._centres[i]
             faces = geometry.faces_of_models[i]
-            self._bodies.append(_Body(self._models[i], faces, np.stack([low - slack, high + slack]), turn, shift))
+            self._bodies.append(
+                _MovingModel(self._models[i], faces, np.stack([low - slack, high + slack]), turn, shift)
+            )
 
     def closest(self, origins: Array, ways: Array, reach: Array | None = None) -> tuple[Ints, Array, Array]:
         """First faces met, int32 (n,), -1 for none, and barycentric u and v there, float32 (n,).
@@ -114,7 +116,7 @@ class Rays:
         return hidden
 
 
-def _embree(positions: Array, faces: Ints) -> Any:
+def _build_scene(positions: Array, faces: Ints) -> Any:
     """An Embree scene, committed. Raises DeviceError without embreex."""
     try:
         from embreex import rtcore_scene
@@ -130,11 +132,11 @@ def _embree(positions: Array, faces: Ints) -> Any:
     return scene
 
 
-def traces_a_ray() -> bool:
+def can_trace() -> bool:
     """Whether Embree finds a triangle before a ray: it comes compiled, so an import alone proves little.
 
     Raises DeviceError without embreex.
     """
-    scene = _embree(np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1]]), np.array([[0, 1, 2]]))
+    scene = _build_scene(np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1]]), np.array([[0, 1, 2]]))
     found = scene.run(np.array([[0.2, 0.2, 0]], np.float32), np.array([[0, 0, 1]], np.float32), output=1)
     return bool(found["primID"][0] == 0)

@@ -48,7 +48,7 @@ class PixelJob:
     threads: int | None = None
 
 
-def from_gbuffer(camera: Camera, near: float, depth: Array, normals: Array, *, smooth: bool = True) -> Surfaces:
+def decode_gbuffer(camera: Camera, near: float, depth: Array, normals: Array, *, smooth: bool = True) -> Surfaces:
     """Decode reversed `depth` (H, W) and octahedral `normals` (H, W, 4), float32, bottom row first.
 
     near: the camera's near plane, in world units. smooth: the scene has shading normals; else both normals are one

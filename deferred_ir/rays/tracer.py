@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.rays.embree import INFINITE, Rays
+from deferred_ir.rays.embree import INFINITE, EmbreeScenes
 from deferred_ir.scene.albedo import look_up_albedo
 from deferred_ir.scene.scene import Scene
 
@@ -61,7 +61,7 @@ class Tracer:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.seconds = 0.0
-        self._rays = Rays(scene.geometry)
+        self._rays = EmbreeScenes(scene.geometry)
         self.offset = OFFSET * scene.geometry.scale
 
     def follow(self, scene: Scene) -> None:
@@ -113,14 +113,14 @@ class Tracer:
         hit = face >= 0
         corners, weights = geometry.faces[face[hit]], weights[hit]
         position, normal, shading, albedo = (np.zeros((len(face), 3)) for _ in range(4))
-        position[hit] = blended(geometry.positions, corners, weights)
-        facing = turned(geometry.face_normals[face[hit]], -directions[hit])
+        position[hit] = interpolate(geometry.positions, corners, weights)
+        facing = face_towards(geometry.face_normals[face[hit]], -directions[hit])
         smooth = facing.copy()
         if geometry.normals is not None:
-            blend = blended(geometry.normals, corners, weights)
+            blend = interpolate(geometry.normals, corners, weights)
             length = np.sqrt(np.einsum("ij,ij->i", blend, blend))
             has = length > 1e-6
-            smooth[has] = turned(blend[has] / length[has, None], facing[has])
+            smooth[has] = face_towards(blend[has] / length[has, None], facing[has])
         normal[hit], shading[hit] = facing, smooth
         albedo[hit] = look_up_albedo(self.scene, face[hit], weights)
         return Hits(face, position, normal, shading, albedo)
@@ -144,14 +144,14 @@ class Tracer:
         return lifted
 
 
-def blended(values: Array, corners: Ints, weights: Array) -> Array:
+def interpolate(values: Array, corners: Ints, weights: Array) -> Array:
     """The rows of `values` (v, 3) at `corners` (n, 3), weighted by `weights` (n, 3) and added up, float64 (n, 3)."""
     a, b, c = (values[corners[:, i]] * weights[:, i, None] for i in range(3))
     total: Array = a + b + c
     return total
 
 
-def turned(normals: Array, towards: Array) -> Array:
+def face_towards(normals: Array, towards: Array) -> Array:
     """`normals` (n, 3), flipped where they point away from `towards` (n, 3)."""
     away = np.einsum("ij,ij->i", normals, towards) < 0
     return np.where(away[:, None], -normals, normals)

@@ -14,7 +14,7 @@ import numpy as np
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.frame.vpl_params import CLAMP, CLAMP_RETURNED, CONE, VPLS
 from deferred_ir.graph.graph import Plan
-from deferred_ir.rays.direct import lit_by
+from deferred_ir.rays.direct import compute_irradiance
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.sampling import streams
 from deferred_ir.sampling.warps import lift_to_hemisphere
@@ -63,7 +63,7 @@ def estimate(
     found, hits = tracer.within(origins[above], away[above], np.inf)
     rays = above[found]
     light = scene.spotlight
-    lit = np.multiply.outer(lit_by(light, tracer, hits, rng), np.asarray(light.emission, float))
+    lit = np.multiply.outer(compute_irradiance(light, tracer, hits, rng), np.asarray(light.emission, float))
     weight = (lit * hits.albedo * seen.albedo[seen_at[rays]]) @ LUMINANCE
     total = weight.sum()
     if total <= 0:

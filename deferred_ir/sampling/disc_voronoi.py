@@ -19,39 +19,41 @@ JITTER = 1e-7
 """Sites are moved by about this much, so that no two coincide and no four lie on a circle."""
 
 
-class Cells:
+class VoronoiCells:
     """The Voronoi diagram of `sites` (n, 2) in the unit disc, n >= 0; `add` puts one more into it."""
 
     def __init__(self, sites: Array) -> None:
         from scipy.spatial import Delaunay
 
         self.sites = np.asarray(sites, float).reshape(-1, 2)
-        self._triangles: Any = Delaunay(np.concatenate([GHOSTS, self._moved(0)]), incremental=True)
+        self._triangles: Any = Delaunay(np.concatenate([GHOSTS, self._jitter_sites(0)]), incremental=True)
 
     def add(self, site: Array) -> None:
         """One more site, (2,), the last from now on."""
         self.sites = np.concatenate([self.sites, site[None]])
-        self._triangles.add_points(self._moved(len(self.sites) - 1))
+        self._triangles.add_points(self._jitter_sites(len(self.sites) - 1))
 
-    def _moved(self, first: int) -> Array:
-        moved: Array = self.sites[first:] + JITTER * _jitter(1 << len(self.sites).bit_length())[first : len(self.sites)]
+    def _jitter_sites(self, first: int) -> Array:
+        moved: Array = (
+            self.sites[first:] + JITTER * _make_jitter(1 << len(self.sites).bit_length())[first : len(self.sites)]
+        )
         return moved
 
-    def _edges(self) -> tuple[Ints, Array, Array]:
+    def _find_edges(self) -> tuple[Ints, Array, Array]:
         """The edges of the cells: the sites on both sides, int (m, 2), and their ends, (m, 2, 2); all corners, (k, 2).
 
         Ghosts have numbers below 0. Those between ghosts that have no end are left out.
         """
         corners, neighbours = self._triangles.simplices, self._triangles.neighbors
-        centres = _circumcentres(self._triangles.points[corners])
+        centres = _find_circumcentres(self._triangles.points[corners])
         triangle, opposite = np.nonzero(neighbours > np.arange(len(corners))[:, None])
         sides = np.stack([corners[triangle, opposite - 2], corners[triangle, opposite - 1]], axis=1) - len(GHOSTS)
         return sides, np.stack([centres[triangle], centres[neighbours[triangle, opposite]]], axis=1), centres
 
-    def shares(self) -> Array:
+    def areas(self) -> Array:
         """Each site's share of the disc, (n,); they add up to 1."""
-        sides, ends, _ = self._edges()
-        area = _swept(ends[:, 0], ends[:, 1])
+        sides, ends, _ = self._find_edges()
+        area = _measure_sectors(ends[:, 0], ends[:, 1])
         points = self._triangles.points[sides + len(GHOSTS)]
         # Seen from a site its edges run counter-clockwise.
         turn = np.sign(_cross(ends[:, 0] - points[:, 0], ends[:, 1] - points[:, 0]))
@@ -61,7 +63,7 @@ class Cells:
             shares += np.bincount(sides[real, side], (sign * area)[real], minlength=len(shares))
         return np.maximum(shares, 0) / np.pi
 
-    def emptiest(self, radius: float = 1.0) -> tuple[Array, float]:
+    def find_emptiest_circle(self, radius: float = 1.0) -> tuple[Array, float]:
         """Centre (2,) of the largest circle without a site among those about points of the disc of `radius`; its size.
 
         It lies at a corner of the cells, or where an edge of a cell leaves the disc, or opposite a site.
@@ -70,12 +72,12 @@ class Cells:
             return np.zeros(2), np.inf
         from scipy.spatial import cKDTree
 
-        sides, ends, corners = self._edges()
+        sides, ends, corners = self._find_edges()
         leaving = (sides >= 0).all(axis=1) & ((ends**2).sum(axis=2) > radius**2).any(axis=1)
         length = np.sqrt((self.sites**2).sum(axis=1, keepdims=True))
         opposite = -radius * self.sites / np.where(length > 0, length, 1)
         opposite[length[:, 0] == 0] = radius, 0
-        rim = np.concatenate([_on_circle(ends[leaving, 0], ends[leaving, 1], radius), opposite])
+        rim = np.concatenate([_cut_with_circle(ends[leaving, 0], ends[leaving, 1], radius), opposite])
         inside = np.flatnonzero((corners**2).sum(axis=1) <= radius**2)
         sites = self._triangles.points[self._triangles.simplices[inside, 0]]
         tried = np.concatenate([corners[inside], rim])
@@ -84,7 +86,7 @@ class Cells:
         return tried[best], float(distance[best])
 
 
-def most_crowded(sites: Array) -> tuple[int, float]:
+def find_most_crowded(sites: Array) -> tuple[int, float]:
     """Which of `sites` (n, 2), n >= 2, to give up, and the distance to its nearest neighbour.
 
     The shortest edge of the Delaunay triangulation joins the closest two sites. Of these it is the one whose next
@@ -100,7 +102,7 @@ def most_crowded(sites: Array) -> tuple[int, float]:
 
 
 @lru_cache(maxsize=8)
-def _jitter(count: int) -> Array:
+def _make_jitter(count: int) -> Array:
     return np.random.default_rng(0).standard_normal((count, 2))
 
 
@@ -109,7 +111,7 @@ def _cross(a: Array, b: Array) -> Array:
     return cross
 
 
-def _circumcentres(corners: Array) -> Array:
+def _find_circumcentres(corners: Array) -> Array:
     """Centres (n, 2) of the circles through triangles (n, 3, 2)."""
     a = corners[:, 0]
     b, c = corners[:, 1] - a, corners[:, 2] - a
@@ -119,7 +121,7 @@ def _circumcentres(corners: Array) -> Array:
     return centres
 
 
-def _crossings(a: Array, b: Array, radius: float) -> Array:
+def _find_crossings(a: Array, b: Array, radius: float) -> Array:
     """Where lines from `a` to `b` (n, 2) enter and leave the circle, (n, 2), 0 at a and 1 at b; NaN if they miss it."""
     way = b - a
     square = np.maximum((way**2).sum(axis=1), 1e-300)
@@ -129,23 +131,23 @@ def _crossings(a: Array, b: Array, radius: float) -> Array:
     return np.stack([middle - half, middle + half], axis=1)
 
 
-def _on_circle(a: Array, b: Array, radius: float) -> Array:
+def _cut_with_circle(a: Array, b: Array, radius: float) -> Array:
     """Points (m, 2) of the circle on segments from `a` to `b` (n, 2)."""
-    at = _crossings(a, b, radius)
+    at = _find_crossings(a, b, radius)
     segment, which = np.nonzero((at >= 0) & (at <= 1))
     return a[segment] + at[segment, which, None] * (b - a)[segment]
 
 
-def _swept(a: Array, b: Array) -> Array:
+def _measure_sectors(a: Array, b: Array) -> Array:
     """Signed area of what the unit disc has of the triangles from its centre to `a` and `b` (n, 2): (n,)."""
-    at = _crossings(a, b, 1.0)
+    at = _find_crossings(a, b, 1.0)
     meets = (at[:, 0] < 1) & (at[:, 1] > 0)
     at = np.clip(np.where(meets[:, None], at, 0), 0, 1)
     p, q = (a + at[:, i, None] * (b - a) for i in (0, 1))
     chord = np.where(meets, _cross(p, q), 0)
-    return (_angle(a, p) + chord + _angle(q, b)) / 2
+    return (_measure_angles(a, p) + chord + _measure_angles(q, b)) / 2
 
 
-def _angle(a: Array, b: Array) -> Array:
+def _measure_angles(a: Array, b: Array) -> Array:
     angle: Array = np.arctan2(_cross(a, b), (a * b).sum(axis=-1))
     return angle

@@ -10,7 +10,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Ints
 
 
-def hilbert_order(points: Array, bits: int) -> Ints:
+def find_hilbert_order(points: Array, bits: int) -> Ints:
     """Indices that sort `points` (n, d), of [0, 1], along a curve through 2^(bits d) cells; bits d is at most 64."""
     cells = np.ascontiguousarray(np.clip(points * 2.0**bits, 0, 2**bits - 1).astype(np.uint64).T)
     zero, one = np.uint64(0), np.uint64(1)

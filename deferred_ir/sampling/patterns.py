@@ -21,7 +21,7 @@ PATTERNS: tuple[str, ...] = get_args(Pattern)
 
 
 @lru_cache(maxsize=8)
-def unit_square(pattern: Pattern, count: int, seed: int) -> Array:
+def sample_unit_square(pattern: Pattern, count: int, seed: int) -> Array:
     """`count` points in [0, 1)^2, float64 (count, 2), the same for the same arguments. Read-only: it is cached."""
     points = _points(pattern, count, seed)
     points.flags.writeable = False
@@ -29,9 +29,9 @@ def unit_square(pattern: Pattern, count: int, seed: int) -> Array:
 
 
 @lru_cache(maxsize=8)
-def unit_disc(pattern: Pattern, count: int, seed: int) -> Array:
-    """`unit_square` mapped to the unit disc. Read-only: it is cached, for frames that repeat a seed."""
-    points = square_to_disc(unit_square(pattern, count, seed))
+def sample_unit_disc(pattern: Pattern, count: int, seed: int) -> Array:
+    """`sample_unit_square` mapped to the unit disc. Read-only: it is cached, for frames that repeat a seed."""
+    points = square_to_disc(sample_unit_square(pattern, count, seed))
     points.flags.writeable = False
     return points
 
@@ -75,7 +75,7 @@ def _stratified(count: int, rng: np.random.Generator) -> Array:
     return points
 
 
-def systematic(weights: Array, count: int, offset: float) -> Ints:
+def resample_systematically(weights: Array, count: int, offset: float) -> Ints:
     """`count` indices, each drawn count * weight / sum(weights) times, rounded up or down (systematic resampling).
 
     Indices come in order. `offset`, uniform in [0, 1), makes it unbiased. Some weight must be above 0.

@@ -40,7 +40,7 @@ def _ranks(block: int) -> Ints:
 
 
 @lru_cache
-def lattice(count: int) -> tuple[int, int, Array]:
+def find_lattice(count: int) -> tuple[int, int, Array]:
     """A rank-1 lattice of `count` points (i, g i mod count) / count: count, g, and its two shortest steps (2, 2).
 
     g makes the longer of the steps as short as it can be.
@@ -48,7 +48,7 @@ def lattice(count: int) -> tuple[int, int, Array]:
     best: tuple[float, int, Array] | None = None
     for g in range(1, count + 1):
         if gcd(g, count) == 1:
-            steps = _reduced(np.array([1, g]), np.array([0, count]))
+            steps = _reduce(np.array([1, g]), np.array([0, count]))
             longer = float((steps[1] ** 2).sum())
             if best is None or longer < best[0]:
                 best = longer, g, steps / count
@@ -56,7 +56,7 @@ def lattice(count: int) -> tuple[int, int, Array]:
     return count, best[1], best[2].astype(np.float32)
 
 
-def _reduced(a: Ints, b: Ints) -> Ints:
+def _reduce(a: Ints, b: Ints) -> Ints:
     """The lattice of integer vectors a and b by its two shortest steps, the shorter first (Gauss's reduction)."""
     while True:
         if a @ a > b @ b:
@@ -67,7 +67,7 @@ def _reduced(a: Ints, b: Ints) -> Ints:
         b = b - times * a
 
 
-def jittered(index: Ints, grid: tuple[int, int, Array], rng: np.random.Generator) -> Array:
+def jitter(index: Ints, grid: tuple[int, int, Array], rng: np.random.Generator) -> Array:
     """A random point in the cell of each lattice point, float32 (n, 2). Cells are parallelograms that tile it."""
     count, g, steps = grid
     jitter = rng.random((len(index), 2), np.float32) @ steps

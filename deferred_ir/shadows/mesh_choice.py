@@ -11,7 +11,7 @@ from deferred_ir.frame.pass_io import Io
 from deferred_ir.meshes import levels
 from deferred_ir.meshes.clusters import Clusters
 from deferred_ir.meshes.posed import MapMesh
-from deferred_ir.meshes.subdivide import subdivided
+from deferred_ir.meshes.subdivide import subdivide_mesh
 from deferred_ir.shadows.figures import STAND_IN_BYTES, STAND_IN_TRIANGLES
 from deferred_ir.shadows.settings import MapParams
 
@@ -21,14 +21,14 @@ def of_vpls(frame: Frame, params: MapParams) -> ClusterBuffers:
     buffers, geometry = frame.buffers, frame.scene.geometry.rest
     if params.projection == "paraboloid" and params.tessellation == "pre":
         longest = params.edge * geometry.diagonal
-        return buffers.stand_in(("edge", params.edge), lambda: subdivided(MapMesh.of(geometry), longest))
+        return buffers.stand_in(("edge", params.edge), lambda: subdivide_mesh(MapMesh.from_geometry(geometry), longest))
     if params.vpl_deviation > 0:
 
         def cluster(mesh: MapMesh) -> Clusters:
-            return levels.DetailClusters(mesh, levels.levels(geometry), params.tolerance)
+            return levels.LevelClusters(mesh, levels.find_levels(geometry), params.tolerance)
 
         key = ("detail", params.vpl_deviation, params.vpl_size, params.projection)
-        return buffers.stand_in(key, lambda: levels.mesh(geometry), cluster)
+        return buffers.stand_in(key, lambda: levels.make_mesh(geometry), cluster)
     return buffers.cluster_buffers
 
 

@@ -26,9 +26,9 @@ def draw(mesh: ClusterBuffers, io: Io, params: MapParams, records: np.ndarray, c
     gpu, clusters = io.gpu, mesh.clusters
     lights = np.flatnonzero(chosen)
     records = records[lights]
-    visible = clusters.visible(records, hemisphere=True)
+    visible = clusters.find_visible(records, hemisphere=True)
     straight = params.tessellation == "pre" and (records["tile"] >= 0).all()
-    bent = np.False_ if straight else clusters.bent(records, params.reach(records))
+    bent = np.False_ if straight else clusters.find_bent(records, params.reach(records))
     gpu.clip(5)  # behind the light, and the map's four sides
     geometry = ["shadow_maps/paraboloid.geom"] if layered and not gpu.layer_from_vertex else []
     for split, share in ((False, visible & ~bent), (True, visible & bent)):

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.base.parallel import in_order
+from deferred_ir.base.parallel import run_in_order
 from deferred_ir.base.progress import Progress
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.scene.scene import Scene
@@ -109,7 +109,7 @@ class PathTracer:
             return direct, self._estimate_indirect(surfaces, counts[batch], rng)
 
         direct, indirect, mean, squares = (np.zeros((len(seen.face), 3)) for _ in range(4))
-        with closing(in_order(work, tasks, threads)) as results:
+        with closing(run_in_order(work, tasks, threads)) as results:
             for done, ((_, batch, chosen), (near, far)) in enumerate(zip(tasks, results, strict=True), start=1):
                 direct[chosen] += near * (counts[batch] / sum(counts))
                 indirect[chosen] += far * (counts[batch] / sum(counts))

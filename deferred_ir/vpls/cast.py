@@ -22,7 +22,7 @@ from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.sampling import streams
-from deferred_ir.sampling.patterns import Pattern, systematic, unit_disc, unit_square
+from deferred_ir.sampling.patterns import Pattern, resample_systematically, sample_unit_disc, sample_unit_square
 from deferred_ir.sampling.warps import build_basis, lift_to_hemisphere, square_to_disc
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.vpls.kernel import cosine_ratio
@@ -69,9 +69,9 @@ def cast(
         if rays == 0:
             break
         rng = streams.bounce(seed, bounce)
-        drawn = systematic(power, rays, rng.random())
+        drawn = resample_systematically(power, rays, rng.random())
         # Each bounce has its own pattern, shuffled: in order it would correlate with that of the bounce before.
-        square = rng.permutation(unit_square(pattern, rays, streams.bounce_pattern(seed, bounce)))
+        square = rng.permutation(sample_unit_square(pattern, rays, streams.bounce_pattern(seed, bounce)))
         normal = last.normal[drawn]
         carried = last.emission[drawn] * (power.sum() / (rays * power[drawn]))[:, None]
         directions = lift_to_hemisphere(square_to_disc(square), normal)
@@ -83,10 +83,10 @@ def cast(
 
 def _start_rays(light: Spotlight, count: int, pattern: Pattern, seed: int) -> tuple[Array, Array]:
     """Return origins and unit directions of the rays of the first bounce, (n, 3) each."""
-    points = unit_disc(pattern, count, seed) * np.sin(np.radians(light.fov) / 2)
+    points = sample_unit_disc(pattern, count, seed) * np.sin(np.radians(light.fov) / 2)
     origins = np.broadcast_to(np.asarray(light.position, float), (count, 3))
     if light.radius > 0:
-        square = unit_square(pattern, count, streams.light_disc_pattern(seed))
+        square = sample_unit_square(pattern, count, streams.light_disc_pattern(seed))
         on_disc = square_to_disc(streams.light_disc(seed).permutation(square))
         right, up = build_basis(light.axis)
         origins = origins + light.radius * (on_disc[:, :1] * right + on_disc[:, 1:] * up)

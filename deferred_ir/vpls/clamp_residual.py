@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints
-from deferred_ir.base.parallel import in_order
-from deferred_ir.rays.direct import lit_by
+from deferred_ir.base.parallel import run_in_order
+from deferred_ir.rays.direct import compute_irradiance
 from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.sampling import pixel_blocks, streams
@@ -47,18 +47,18 @@ def trace_residual(job: PixelJob, limits: VplLimits, *, samples: float, bounces:
     weight = block * block * each / total
     per_task = max(1, RAYS // each)
     tasks = [(i, slice(start, start + per_task)) for i, start in enumerate(range(0, len(traced), per_task))]
-    lattice = pixel_blocks.lattice(total)
+    lattice = pixel_blocks.find_lattice(total)
     rays, emission = _Rays(job.tracer, seen, limits, bounces), np.asarray(job.tracer.scene.spotlight.emission, float)
 
     def work(task: tuple[int, slice]) -> Array:
         number, chosen = task
         rng = streams.residual_rays(seed, number)
         rows = np.repeat(traced[chosen], each)
-        points = (pixel_blocks.jittered(index[chosen].reshape(-1), lattice, rng) + shift) % 1
+        points = (pixel_blocks.jitter(index[chosen].reshape(-1), lattice, rng) + shift) % 1
         irradiance: Array = rays.trace(rows, points, rng).reshape(-1, each, 3).mean(axis=1) * emission
         return irradiance
 
-    with closing(in_order(work, tasks, job.threads)) as results:
+    with closing(run_in_order(work, tasks, job.threads)) as results:
         for (_, chosen), part in zip(tasks, results, strict=True):
             pixels = seen.pixel[traced[chosen]]
             image[pixels, :3] = part * weight
@@ -90,7 +90,7 @@ class _Rays:
         for bounce in range(self.bounces):
             if bounce:
                 rays, throughput, at = self._carry_on(rays, throughput, at, rng)
-            carried[rays] += throughput * lit_by(tracer.scene.spotlight, tracer, at, rng)[:, None]
+            carried[rays] += throughput * compute_irradiance(tracer.scene.spotlight, tracer, at, rng)[:, None]
         return carried
 
     def _carry_on(self, rays: Ints, throughput: Array, at: Hits, rng: np.random.Generator) -> tuple[Ints, Array, Hits]:

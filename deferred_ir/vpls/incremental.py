@@ -19,7 +19,7 @@ from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.versions import new_version, new_versions
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.sampling import streams
-from deferred_ir.sampling.disc_voronoi import Cells, most_crowded
+from deferred_ir.sampling.disc_voronoi import VoronoiCells, find_most_crowded
 from deferred_ir.sampling.warps import build_basis
 from deferred_ir.sampling.warps import square_to_disc as unit_disc
 from deferred_ir.scene.geometry import transform_points
@@ -76,7 +76,7 @@ class IncrementalVpls:
         self._begin_frame(light, tracer, disc)
         budget, most = most, most - min(most // RESERVED, int(self._maps.stale.sum()))
         slots = np.flatnonzero(self.used)
-        cells = Cells(disc.project(self.direction[slots]))
+        cells = VoronoiCells(disc.project(self.direction[slots]))
         free = np.flatnonzero(~self.used)[:most]
         for _ in free:
             cells.add(self._find_hole(cells)[0])
@@ -85,7 +85,7 @@ class IncrementalVpls:
         slots = np.append(np.delete(slots, moved), slots[moved])
         fresh = np.union1d(free, slots[len(slots) - len(moved) :])
         self.weights[:] = 0
-        self.weights[slots] = cells.shares()
+        self.weights[slots] = cells.areas()
         place = np.zeros((len(self.used), 2))
         place[slots] = cells.sites
         self._shoot(light, tracer, fresh, disc.unproject(place[fresh]))
@@ -167,13 +167,13 @@ class IncrementalVpls:
         reached[missed] &= ~tracer.closest(origins[missed], self.direction[missed]).hit
         return reached
 
-    def _find_hole(self, cells: Cells) -> tuple[Array, float]:
+    def _find_hole(self, cells: VoronoiCells) -> tuple[Array, float]:
         """Return where the next site goes, (2,), and how far it is from the others."""
         if not len(cells.sites):
             return unit_disc(self._rng.random((1, 2)))[0] / 2, np.inf
-        return cells.emptiest(1 - MARGIN / np.sqrt(len(cells.sites) + 1))
+        return cells.find_emptiest_circle(1 - MARGIN / np.sqrt(len(cells.sites) + 1))
 
-    def _spread(self, cells: Cells, most: int) -> tuple[Cells, list[int]]:
+    def _spread(self, cells: VoronoiCells, most: int) -> tuple[VoronoiCells, list[int]]:
         """Move up to `most` of the most crowded sites to where there is most room.
 
         Returns the cells, those that were moved last, and the rows that these had before. The shortest distance between
@@ -183,11 +183,11 @@ class IncrementalVpls:
         while count > 0:
             left, gone, near, far = np.arange(len(cells.sites)), list[int](), list[float](), list[float]()
             for _ in range(count):
-                row, distance = most_crowded(cells.sites[left])
+                row, distance = find_most_crowded(cells.sites[left])
                 gone.append(int(left[row]))
                 near.append(distance)
                 left = np.delete(left, row)
-            other = Cells(cells.sites[left])
+            other = VoronoiCells(cells.sites[left])
             for _ in range(count):
                 site, distance = self._find_hole(other)
                 other.add(site)

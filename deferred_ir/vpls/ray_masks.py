@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.base.parallel import in_order
+from deferred_ir.base.parallel import run_in_order
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.vpls.cast import Vpls
@@ -57,7 +57,7 @@ def trace_masks(
         return _trace(tracer, seen, rows, candidates.part(chosen), limits.edge)
 
     rays = 0
-    with closing(in_order(work, tasks, threads)) as results:
+    with closing(run_in_order(work, tasks, threads)) as results:
         for (rows, _), (part, traced) in zip(tasks, results, strict=True):
             words[: len(part), rows] = part
             rays += traced

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from deferred_ir.base.arrays import Array
-from deferred_ir.base.parallel import in_order
+from deferred_ir.base.parallel import run_in_order
 from deferred_ir.base.progress import Progress
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.vpls.cast import Vpls
@@ -118,7 +118,9 @@ def sum_radiance(
     surfaces = [ScaledSurfaces(tracer, seen.rows(rows)) for rows in patches]
     tasks = [(patch, block) for patch in range(len(patches)) for block in blocks]
     total = np.zeros((len(seen.face), 3))
-    with closing(in_order(lambda task: surfaces[task[0]].sum_irradiance(scaled, task[1]), tasks, threads)) as results:
+    with closing(
+        run_in_order(lambda task: surfaces[task[0]].sum_irradiance(scaled, task[1]), tasks, threads)
+    ) as results:
         for done, ((patch, _), part) in enumerate(zip(tasks, results, strict=True), start=1):
             total[patches[patch]] += part.T
             if progress:

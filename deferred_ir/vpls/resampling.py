@@ -23,11 +23,11 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.colour import LUMINANCE
-from deferred_ir.base.parallel import in_order
+from deferred_ir.base.parallel import run_in_order
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.sampling import streams
-from deferred_ir.sampling.hilbert import hilbert_order
-from deferred_ir.sampling.patterns import systematic, unit_square
+from deferred_ir.sampling.hilbert import find_hilbert_order
+from deferred_ir.sampling.patterns import resample_systematically, sample_unit_square
 from deferred_ir.scene.camera import Camera
 from deferred_ir.vpls.cast import Vpls
 from deferred_ir.vpls.kernel import VplLimits
@@ -47,7 +47,7 @@ BITS = 10
 
 def find_probes(tracer: Tracer, camera: Camera, size: tuple[int, int], seed: int = 0) -> Hits:
     """Return the surfaces behind up to PROBES well-spread pixel centres of an image of `size` (width, height)."""
-    pixels = np.floor(unit_square("sobol", TRIES, streams.resampling_pattern(seed)) * size) + 0.5
+    pixels = np.floor(sample_unit_square("sobol", TRIES, streams.resampling_pattern(seed)) * size) + 0.5
     x, y = (pixels / size * 2 - 1).T
     directions = np.column_stack([x, y, np.ones(TRIES)]) @ camera.ray_axes(size)
     seen = tracer.closest(np.broadcast_to(np.asarray(camera.position, float), directions.shape), directions)
@@ -74,7 +74,7 @@ def estimate_effects(tracer: Tracer, seen: Hits, vpls: Vpls, limits: VplLimits, 
         return squares
 
     squares = np.zeros(len(vpls))
-    with closing(in_order(work, tasks, threads)) as results:
+    with closing(run_in_order(work, tasks, threads)) as results:
         for part in results:
             squares += part
     return np.sqrt(squares)
@@ -91,8 +91,8 @@ def resample(vpls: Vpls, effect: Array, count: int, seed: int = 0) -> Vpls:
     even = np.full(len(vpls), 1 / len(vpls))
     total = effect.sum()
     probability = EVEN * even + (1 - EVEN) * effect / total if total > 0 else even
-    order = hilbert_order(_cube_points(vpls), BITS)
-    drawn = systematic(probability[order], count, streams.resampling(seed).random())
+    order = find_hilbert_order(_cube_points(vpls), BITS)
+    drawn = resample_systematically(probability[order], count, streams.resampling(seed).random())
     drawn, times = np.unique(drawn, return_counts=True)
     chosen = order[drawn]
     gain = times * probability.sum() / (count * probability[chosen])

@@ -97,7 +97,7 @@ def test_what_is_left_out_lies_behind_one_plane_for_the_shader_too(seed, fov, sc
     mesh = triangle_soup(seed, 64, scale, offset * scale)
     clusters = Clusters(mesh.positions, mesh.faces, most=4)
     lights = lights_among(mesh, seed, fov=fov)
-    visible = clusters.visible(lights, hemisphere=hemisphere)
+    visible = clusters.find_visible(lights, hemisphere=hemisphere)
     for light, row in zip(lights, visible, strict=True):
         for cluster in np.flatnonzero(~row):
             faces = mesh.faces[clusters.order[clusters.starts[cluster] : clusters.starts[cluster + 1]]]
@@ -113,7 +113,7 @@ def test_what_a_light_cannot_see_is_left_out(hemisphere):
     corners = centre / np.linalg.norm(centre, axis=-1, keepdims=True) + 1e-3 * rng.normal(size=(4000, 3, 3))
     clusters = Clusters(corners.reshape(-1, 3), np.arange(12000).reshape(-1, 3), most=8)
     light = vpl_records(np.zeros((1, 3)), [(0.3, 0.5, -0.2)], np.ones((1, 3)), fov=90.0)
-    share = clusters.visible(light, hemisphere=hemisphere)[0] @ clusters.sizes / 4000
+    share = clusters.find_visible(light, hemisphere=hemisphere)[0] @ clusters.sizes / 4000
     seen = 1 / 2 if hemisphere else 1 / 6
     assert seen <= share < seen + 0.1
 
@@ -121,7 +121,7 @@ def test_what_a_light_cannot_see_is_left_out(hemisphere):
 def test_no_lights_see_no_clusters():
     mesh = triangle_soup(1)
     clusters = Clusters(mesh.positions, mesh.faces, most=8)
-    assert clusters.visible(np.zeros(0, LIGHT)).shape == (0, len(clusters))
+    assert clusters.find_visible(np.zeros(0, LIGHT)).shape == (0, len(clusters))
 
 
 # On the device
@@ -136,7 +136,7 @@ class Atlases:
         self.patch = monkeypatch
 
     def __call__(self, scene, most: int) -> np.ndarray:
-        self.patch.setattr(MapMesh, "clustered", lambda mesh: Clusters(mesh.positions, mesh.faces, most))
+        self.patch.setattr(MapMesh, "make_clusters", lambda mesh: Clusters(mesh.positions, mesh.faces, most))
         self.one._forget()
         self.one.render(scene)
         with self.one.gpu.ctx:

@@ -38,14 +38,14 @@ def lights(count=40, fov=150.0):
 
 
 def clusters(scene, params):
-    return detail.DetailClusters(detail.mesh(scene.geometry), detail.levels(scene.geometry), params.tolerance)
+    return detail.LevelClusters(detail.make_mesh(scene.geometry), detail.find_levels(scene.geometry), params.tolerance)
 
 
 @pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
 def test_each_light_draws_each_chunk_at_one_level_that_it_may(balls, projection):
     params = MapParams(vpl_deviation=1.0, vpl_size=64, projection=projection)
-    found, levels, records = clusters(balls, params), detail.levels(balls.geometry), lights()
-    drawn = found.drawn(records)
+    found, levels, records = clusters(balls, params), detail.find_levels(balls.geometry), lights()
+    drawn = found.find_drawn(records)
     half = math.radians(75)
     texel = 2 * math.tan(half) / 64 if projection == "perspective" else 4 * math.tan(half / 2) / 64
     chosen = set()
@@ -62,7 +62,7 @@ def test_each_light_draws_each_chunk_at_one_level_that_it_may(balls, projection)
 
 def test_chunks_of_any_levels_leave_no_gap(balls):
     """Every edge belongs to two triangles, or more where chunks meet, whichever level each chunk has."""
-    levels, rng = detail.levels(balls.geometry), np.random.default_rng(0)
+    levels, rng = detail.find_levels(balls.geometry), np.random.default_rng(0)
     for _ in range(8):
         choice = rng.integers(len(levels.deviations), size=levels.boxes.shape[1])
         faces = levels.faces[choice[levels.chunk] == levels.level]
@@ -71,12 +71,12 @@ def test_chunks_of_any_levels_leave_no_gap(balls):
 
 
 def test_levels_are_made_once(balls):
-    assert detail.levels(balls.geometry) is detail.levels(replace(balls, name="again").geometry)
+    assert detail.find_levels(balls.geometry) is detail.find_levels(replace(balls, name="again").geometry)
 
 
 def test_units_do_not_matter(balls):
     large = scaled(balls, 1024.0)
-    one, other = (np.bincount(detail.levels(scene.geometry).level) for scene in (balls, large))
+    one, other = (np.bincount(detail.find_levels(scene.geometry).level) for scene in (balls, large))
     np.testing.assert_array_equal(one, other)
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from deferred_ir.meshes.simplify import simplify, welded
+from deferred_ir.meshes.simplify import simplify, weld_vertices
 
 
 def sampled(positions, faces, seed):
@@ -73,7 +73,7 @@ KINDS = ["terrain", "folded", "plate", "ball", "tube", "soup"]
 )
 def test_both_surfaces_keep_to_the_deviation(kind, seed, deviation, scale):
     positions, faces = shape(kind, seed)
-    faces = welded(positions, faces)
+    faces = weld_vertices(positions, faces)
     deviations = np.array([deviation / 3, deviation])
     whole = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     found = simplify(positions * scale, faces, deviations * scale, none(positions))
@@ -138,6 +138,6 @@ def test_next_to_nothing(faces):
 def test_seams_are_welded():
     positions, faces = grid(4, 4, lambda x, y: 0 * x)
     apart, split = positions[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
-    together = welded(apart, split)
+    together = weld_vertices(apart, split)
     assert len(np.unique(together)) == len(positions)
     np.testing.assert_array_equal(apart[together], apart[split])

@@ -11,7 +11,7 @@ from small_scenes import Mesh, box, build, plane, room, sphere, textured
 
 from deferred_ir.base.colour import linear_from_srgb
 from deferred_ir.base.errors import DeviceError
-from deferred_ir.rays.tracer import CHUNK, Tracer, turned
+from deferred_ir.rays.tracer import CHUNK, Tracer, face_towards
 
 RNG = np.random.default_rng(7)
 
@@ -184,4 +184,4 @@ def test_without_embreex_one_line_says_what_still_works(monkeypatch):
 
 def test_turned():
     towards = np.array([[0.0, 0, 1], [0, 0, 1]])
-    np.testing.assert_array_equal(turned(np.array([[0.0, 1, -1], [1, 0, 1]]), towards), [[0, -1, 1], [1, 0, 1]])
+    np.testing.assert_array_equal(face_towards(np.array([[0.0, 1, -1], [1, 0, 1]]), towards), [[0, -1, 1], [1, 0, 1]])

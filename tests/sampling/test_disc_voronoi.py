@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from deferred_ir.sampling.disc_voronoi import Cells, most_crowded
+from deferred_ir.sampling.disc_voronoi import VoronoiCells, find_most_crowded
 
 GRID = np.stack(np.meshgrid(*[np.linspace(-1, 1, 301)] * 2), axis=-1).reshape(-1, 2)
 GRID = GRID[(GRID**2).sum(axis=1) <= 1]
@@ -37,7 +37,7 @@ def by_place(sites, shares):
 
 @given(sites())
 def test_shares_are_those_of_the_points_that_are_nearest(sites):
-    shares = Cells(sites).shares()
+    shares = VoronoiCells(sites).areas()
     assert shares.min() >= 0
     assert shares.sum() == pytest.approx(1, abs=1e-9)
     counted = np.bincount(cKDTree(sites).query(GRID)[1], minlength=len(sites)) / len(GRID)
@@ -46,7 +46,7 @@ def test_shares_are_those_of_the_points_that_are_nearest(sites):
 
 @given(sites(), st.floats(0.1, 1.0))
 def test_no_point_of_the_disc_is_farther_from_all_sites(sites, radius):
-    centre, distance = Cells(sites).emptiest(radius)
+    centre, distance = VoronoiCells(sites).find_emptiest_circle(radius)
     tree = cKDTree(sites)
     assert np.hypot(*centre) <= radius * (1 + 1e-9)
     assert tree.query(centre)[0] == pytest.approx(distance, abs=1e-6)
@@ -56,33 +56,33 @@ def test_no_point_of_the_disc_is_farther_from_all_sites(sites, radius):
 @given(sites(least=0), st.integers(1, 5))
 def test_sites_that_are_added_are_as_if_they_had_been_there(sites, count):
     more = np.random.default_rng(len(sites)).uniform(-0.7, 0.7, (count, 2))
-    grown = Cells(sites)
+    grown = VoronoiCells(sites)
     for site in more:
         grown.add(site)
     every = np.concatenate([sites, more])
-    whole = Cells(every)
-    np.testing.assert_allclose(by_place(every, grown.shares()), by_place(every, whole.shares()), atol=1e-6)
-    np.testing.assert_allclose(grown.emptiest()[1], whole.emptiest()[1], atol=1e-6)
+    whole = VoronoiCells(every)
+    np.testing.assert_allclose(by_place(every, grown.areas()), by_place(every, whole.areas()), atol=1e-6)
+    np.testing.assert_allclose(grown.find_emptiest_circle()[1], whole.find_emptiest_circle()[1], atol=1e-6)
 
 
 def test_one_site_has_it_all_and_the_farthest_point_is_opposite():
-    cells = Cells([[0.3, 0.4]])
-    assert cells.shares() == pytest.approx([1])
-    centre, distance = cells.emptiest()
+    cells = VoronoiCells([[0.3, 0.4]])
+    assert cells.areas() == pytest.approx([1])
+    centre, distance = cells.find_emptiest_circle()
     np.testing.assert_allclose(centre, [-0.6, -0.8])
     assert distance == pytest.approx(1.5)
 
 
 def test_an_empty_disc_is_empty_about_its_centre():
-    centre, distance = Cells(np.zeros((0, 2))).emptiest()
+    centre, distance = VoronoiCells(np.zeros((0, 2))).find_emptiest_circle()
     assert (centre == 0).all()
     assert distance == np.inf
-    assert len(Cells(np.zeros((0, 2))).shares()) == 0
+    assert len(VoronoiCells(np.zeros((0, 2))).areas()) == 0
 
 
 @given(sites(least=2))
 def test_the_most_crowded_is_of_the_closest_pair_and_nearer_to_the_rest(sites):
-    given_up, near = most_crowded(sites)
+    given_up, near = find_most_crowded(sites)
     distance = np.linalg.norm(sites[:, None] - sites, axis=2)
     distance[np.diag_indices(len(sites))] = np.inf
     assert near == pytest.approx(distance.min(), abs=1e-12)

@@ -28,11 +28,11 @@ def test_every_window_of_a_block_has_each_cell_once(block, samples, x, y, turn):
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 16, 64, 256])
 def test_cells_tile_the_square(count):
     """Where cells overlapped or left gaps, points drawn evenly from all would not be even."""
-    grid = pixel_blocks.lattice(count)
+    grid = pixel_blocks.find_lattice(count)
     steps = grid[2].astype(float)
     assert abs(np.linalg.det(steps)) * count == pytest.approx(1, rel=1e-4)
     each = 160_000 // count
-    points = pixel_blocks.jittered(np.repeat(np.arange(count), each), grid, np.random.default_rng(3))
+    points = pixel_blocks.jitter(np.repeat(np.arange(count), each), grid, np.random.default_rng(3))
     assert ((points >= 0) & (points < 1)).all()
     cells, _, _ = np.histogram2d(*points.T, bins=8, range=[[0, 1], [0, 1]])
     np.testing.assert_allclose(cells, len(points) / 64, rtol=0.12)

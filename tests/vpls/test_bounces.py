@@ -10,7 +10,7 @@ from small_scenes import box, build, room, sphere
 
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.sampling.patterns import systematic
+from deferred_ir.sampling.patterns import resample_systematically
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.vpls.cast import cast
 
@@ -91,7 +91,7 @@ def test_white_walls_and_fifty_bounces_stay_finite():
 @given(st.lists(st.floats(0, 1e6), min_size=1, max_size=50), st.integers(1, 80), st.floats(0, 1, exclude_max=True))
 def test_systematic_resampling_draws_each_in_proportion(powers, count, offset):
     power = np.array(powers) + 1e-6
-    drawn = np.bincount(systematic(power, count, offset), minlength=len(power))
+    drawn = np.bincount(resample_systematically(power, count, offset), minlength=len(power))
     assert drawn.sum() == count
     assert np.all(np.abs(drawn - count * power / power.sum()) < 1 + 1e-6)
 

@@ -13,7 +13,7 @@ from small_scenes import box, build, plane, room, scaled, sphere, textured
 
 from deferred_ir.base.colour import linear_from_srgb
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.sampling.patterns import PATTERNS, systematic
+from deferred_ir.sampling.patterns import PATTERNS, resample_systematically
 from deferred_ir.sampling.warps import square_to_disc
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.vpls import cast as vpls
@@ -170,7 +170,7 @@ def test_units_of_length_do_not_matter(scale):
 def test_rays_on_the_very_rim_of_a_half_space_are_fine(monkeypatch):
     """sin^2 + cos^2 may round to more than 1."""
     rim = np.column_stack([np.zeros(100_000), np.linspace(0, 1, 100_000)])
-    monkeypatch.setattr(vpls, "unit_disc", lambda *_: square_to_disc(rim))
+    monkeypatch.setattr(vpls, "sample_unit_disc", lambda *_: square_to_disc(rim))
     lights = cast(replace(LIGHT, fov=np.nextafter(180, 0)), Tracer(CLOSED), len(rim))
     assert np.isfinite(lights.emission).all()
 
@@ -246,6 +246,6 @@ def test_a_round_lights_rays_start_on_its_disc():
 
 @pytest.mark.parametrize("share", [(1.0, 1.0, 1.0), (3.0, 0.0, 1.0), (1e-30, 1e30, 1e30), (0.0, 0.0, 5.0)])
 def test_lights_go_on_in_proportion_to_their_power(share):
-    drawn = np.bincount(systematic(np.array(share), 1000, 0.37), minlength=3)
+    drawn = np.bincount(resample_systematically(np.array(share), 1000, 0.37), minlength=3)
     np.testing.assert_allclose(drawn, 1000 * np.array(share) / sum(share), atol=1)
     assert (drawn[np.array(share) == 0] == 0).all()

@@ -9,7 +9,7 @@ import pytest
 from small_scenes import build, plane, quad, room, scaled, sphere, textured
 
 from deferred_ir.frame.frame import NEAR
-from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces, from_gbuffer
+from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces, decode_gbuffer
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
@@ -281,7 +281,7 @@ def test_the_g_buffer_gives_the_surfaces_that_rays_find(renderer, tmp_path, scen
     with one.gpu.ctx:
         depth, normals = (one.executor.resource(("gbuffer", port)).read() for port in ("depth", "normals"))
     near = NEAR * scene.geometry.diagonal
-    found = from_gbuffer(scene.camera, near, depth[..., 0], normals)
+    found = decode_gbuffer(scene.camera, near, depth[..., 0], normals)
     expected, _ = seen_by(scene, one.tracer())
     flipped = (SIZE[1] - 1 - found.pixel // SIZE[0]) * SIZE[0] + found.pixel % SIZE[0]
     common, mine, theirs = np.intersect1d(flipped, expected.pixel, return_indices=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from closed_forms import mean_cone_factor
 
-from deferred_ir.sampling.patterns import unit_disc
+from deferred_ir.sampling.patterns import sample_unit_disc
 from deferred_ir.sampling.warps import build_basis, lift_to_hemisphere, square_to_disc
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.vpls.emission_disc import EmissionDisc
@@ -36,7 +36,7 @@ def test_points_and_directions_are_each_others_reverse(fov):
 def test_a_part_of_the_disc_gets_its_share_of_the_light(fov):
     """Light by Nusselt's analogue and the cone, summed where the points fall."""
     light, emission = disc_of(fov)
-    even = unit_disc("sobol", 2**16, 0) * math.sin(math.radians(fov) / 2)
+    even = sample_unit_disc("sobol", 2**16, 0) * math.sin(math.radians(fov) / 2)
     directions = lift_to_hemisphere(even, light.axis[None])
     points, sent = emission.project(directions), light.cone(directions) / len(even)
     assert emission.power == pytest.approx(math.sin(math.radians(fov) / 2) ** 2 * mean_cone_factor(fov))

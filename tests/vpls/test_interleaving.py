@@ -13,7 +13,7 @@ from small_scenes import Mesh, box, build, crooked_room, plane, quad, room, sphe
 from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.frame import NEAR
 from deferred_ir.loading.load import load
-from deferred_ir.rays.pixel_surfaces import from_gbuffer
+from deferred_ir.rays.pixel_surfaces import decode_gbuffer
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.vpls.interleaving import deal, find_share_starts, find_sub_buffers
@@ -106,7 +106,7 @@ def gathered(scene, n, fewest, shares, gbuffer):
     depth, normals = gbuffer
     height, width = depth.shape
     position, normal, shading = np.zeros((3, height, width, 3))
-    seen = from_gbuffer(scene.camera, NEAR * scene.geometry.diagonal, depth, normals)
+    seen = decode_gbuffer(scene.camera, NEAR * scene.geometry.diagonal, depth, normals)
     for image, values in ((position, seen.position), (normal, seen.normal), (shading, seen.shading_normal)):
         image.reshape(-1, 3)[seen.pixel] = values
     rectangles = find_sub_buffers((width, height), n)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from deferred_ir.base.errors import OutputError, SettingError, shown
+from deferred_ir.base.errors import OutputError, SettingError, format_value
 from deferred_ir.cli.options import print_notes
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def _check_same_scene(image: _Input, reference: _Input) -> None:
     """Raise SettingError if the metadata say that the images show different scenes."""
     both = image.metadata, reference.metadata
     if all(both) and both[0]["scene_hash"] != both[1]["scene_hash"]:
-        names = [f"{shown(one.get('scene'))} ({shown(one['scene_hash'])})" for one in both]
+        names = [f"{format_value(one.get('scene'))} ({format_value(one['scene_hash'])})" for one in both]
         raise SettingError(
             f"{image.path}: shows the scene {names[0]}, but {reference.path} shows {names[1]}; compare like with like"
         )

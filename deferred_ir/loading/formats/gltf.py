@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array
-from deferred_ir.base.errors import SceneError, shown
+from deferred_ir.base.errors import SceneError, format_value
 from deferred_ir.loading.asset_paths import Assets
 from deferred_ir.loading.formats import gltf_checks
 from deferred_ir.loading.formats.model_format import ModelFormat, Reflectance, choose_plain_albedo
@@ -85,14 +85,14 @@ def read(path: Path, data: bytes, root: Path | None = None) -> GltfFile:
     """Make the .gltf or .glb file `data` at `path` ready for trimesh. root: see Assets. Raises SceneError."""
     assets = Assets([path.parent], root=root)
     try:
-        header, binary = _chunks(data) if data[:4] == b"glTF" else (data, None)
+        header, binary = _split_chunks(data) if data[:4] == b"glTF" else (data, None)
         document = json.loads(header.decode("utf-8-sig"))
         if not isinstance(document, dict):
             raise ValueError("not a JSON object")
-        notes = tuple(f"{path.name}: {note}" for note in _notes(document))
+        notes = tuple(f"{path.name}: {note}" for note in _find_notes(document))
         _refuse(document)
         materials = _prepare(document)
-        buffers = _buffers(document, binary, assets)
+        buffers = _read_buffers(document, binary, assets)
         gltf_checks.check(document, buffers)
         for index, buffer in enumerate(buffers):
             document["buffers"][index] = {"byteLength": len(buffer), "uri": f"buffer {index}"}
@@ -108,24 +108,24 @@ def read(path: Path, data: bytes, root: Path | None = None) -> GltfFile:
     return GltfFile(json.dumps(document).encode(), assets, materials, notes)
 
 
-def _buffers(document: Json, binary: bytes | None, assets: Assets) -> list[bytes]:
+def _read_buffers(document: Json, binary: bytes | None, assets: Assets) -> list[bytes]:
     """The contents of the document's buffers; `binary` is that of the one without a URI. A file is read once."""
     read: dict[str | None, bytes] = {} if binary is None else {None: binary}
     buffers = []
     for index, buffer in enumerate(document.get("buffers", [])):
         uri = buffer.get("uri")
         if uri not in read:
-            read[uri] = _content(f"buffers[{index}].uri", uri, assets)
+            read[uri] = _read_content(f"buffers[{index}].uri", uri, assets)
         if not isinstance(buffer["byteLength"], int) or buffer["byteLength"] > len(read[uri]):
-            what = f"says {shown(buffer['byteLength'])} bytes, but has {len(read[uri])}"
+            what = f"says {format_value(buffer['byteLength'])} bytes, but has {len(read[uri])}"
             raise SceneError(f"buffers[{index}]: {what}; export it again")
         buffers.append(read[uri])
     return buffers
 
 
-def _content(where: str, uri: Any, assets: Assets) -> bytes:
+def _read_content(where: str, uri: Any, assets: Assets) -> bytes:
     if not isinstance(uri, str):
-        raise SceneError(f"{where}: must be a name or data, not {shown(uri)}; export it again")
+        raise SceneError(f"{where}: must be a name or data, not {format_value(uri)}; export it again")
     if not uri.startswith("data:"):
         return assets[uri]
     try:
@@ -134,7 +134,7 @@ def _content(where: str, uri: Any, assets: Assets) -> bytes:
         raise SceneError(f"{where}: its base64 is broken ({error}); export it again") from error
 
 
-def _chunks(data: bytes) -> tuple[bytes, bytes]:
+def _split_chunks(data: bytes) -> tuple[bytes, bytes]:
     """The JSON and the first binary chunk of a GLB."""
     _, version, _ = struct.unpack_from("<4sII", data)
     if version != 2:
@@ -150,7 +150,7 @@ def _chunks(data: bytes) -> tuple[bytes, bytes]:
     return found[b"JSON"], found.get(b"BIN\0", b"")
 
 
-def _primitives(document: Json) -> Iterator[Json]:
+def _iterate_primitives(document: Json) -> Iterator[Json]:
     return (primitive for mesh in document.get("meshes", []) for primitive in mesh["primitives"])
 
 
@@ -160,7 +160,7 @@ def _refuse(document: Json) -> None:
     if compressed:
         raise SceneError(f"compressed with {', '.join(sorted(compressed))}; export it without mesh compression")
     accessors = document.get("accessors", [])
-    for primitive in _primitives(document):
+    for primitive in _iterate_primitives(document):
         attributes = primitive["attributes"]
         indices = [primitive["indices"]] if "indices" in primitive else []
         for accessor in (accessors[index] for index in [*attributes.values(), *indices]):
@@ -172,7 +172,7 @@ def _refuse(document: Json) -> None:
                 raise SceneError(f"{name} is stored in normalised integers; export it without quantisation")
 
 
-def _notes(document: Json) -> Iterator[str]:
+def _find_notes(document: Json) -> Iterator[str]:
     """What of the file is not honoured."""
     used = {*document.get("extensionsUsed", []), *document.get("extensionsRequired", [])}
     if ignored := used - HONOURED - ELSEWHERE - COMPRESSED:
@@ -185,7 +185,7 @@ def _notes(document: Json) -> Iterator[str]:
         yield "emission is ignored"
     if any(material.get("alphaMode", "OPAQUE") != "OPAQUE" for material in materials):
         yield "transparency is ignored"
-    bases = [_base(material) for material in materials]
+    bases = [_find_base(material) for material in materials]
     metallic = [material["pbrMetallicRoughness"] for material in materials if "pbrMetallicRoughness" in material]
     if any(factors.get("metallicFactor", 1) > 0 for factors in metallic):
         yield "metals are taken as matt surfaces of their base colour"
@@ -199,11 +199,11 @@ def _notes(document: Json) -> Iterator[str]:
         yield "textures repeat, although the file wants them clamped or mirrored"
     if document.get("animations") or document.get("skins"):
         yield "animations and skins are ignored"
-    if any(primitive.get("mode", TRIANGLES) not in (TRIANGLES, STRIP) for primitive in _primitives(document)):
+    if any(primitive.get("mode", TRIANGLES) not in (TRIANGLES, STRIP) for primitive in _iterate_primitives(document)):
         yield "points, lines and triangle fans are left out"
 
 
-def _base(material: Json) -> Json:
+def _find_base(material: Json) -> Json:
     """The table that holds a material's baseColorFactor and baseColorTexture."""
     glossy = material.get("extensions", {}).get(GLOSSY)
     if glossy is not None and "pbrMetallicRoughness" not in material:
@@ -216,18 +216,18 @@ def _base(material: Json) -> Json:
 def _prepare(document: Json) -> tuple[BaseColor, ...]:
     """Change `document` into what trimesh reads right; returns its materials."""
     materials = document.setdefault("materials", [])
-    bare = [primitive for primitive in _primitives(document) if "material" not in primitive]
+    bare = [primitive for primitive in _iterate_primitives(document) if "material" not in primitive]
     if bare:
         materials.append({})
     for primitive in bare:
         primitive["material"] = len(materials) - 1
-    colors = [_base_color(document, material, index) for index, material in enumerate(materials)]
+    colors = [_read_base_color(document, material, index) for index, material in enumerate(materials)]
     wanted = {color.source for color in colors}
     for index in range(len(document.get("images", []))):
         if index not in wanted:
             document["images"][index] = {}  # trimesh need not read images that nobody uses
     for index, material in enumerate(materials):
-        base = _base(material)
+        base = _find_base(material)
         kept = {"baseColorTexture": base["baseColorTexture"]} if "baseColorTexture" in base else {}
         materials[index] = {"name": str(index), "pbrMetallicRoughness": kept}
     for node in document.get("nodes", []):
@@ -240,8 +240,8 @@ def _prepare(document: Json) -> tuple[BaseColor, ...]:
     return tuple(colors)
 
 
-def _base_color(document: Json, material: Json, index: int) -> BaseColor:
-    base = _base(material)
+def _read_base_color(document: Json, material: Json, index: int) -> BaseColor:
+    base = _find_base(material)
     factor = tuple(float(value) for value in base.get("baseColorFactor", (1.0, 1.0, 1.0)))
     if len(factor) < 3:
         raise ValueError("baseColorFactor has fewer than three numbers")

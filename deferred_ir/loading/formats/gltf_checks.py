@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from deferred_ir.base.errors import SceneError, shown
+from deferred_ir.base.errors import SceneError, format_value
 
 Json = dict[str, Any]
 
@@ -23,18 +23,19 @@ COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9
 
 def check(document: Json, buffers: Sequence[bytes]) -> None:
     """Raise SceneError for the first number of `document` that does not fit `buffers`, its buffers' contents."""
-    views = [_view(f"bufferViews[{index}]", view, buffers) for index, view in enumerate(_list(document, "bufferViews"))]
-    accessors = _list(document, "accessors")
+    buffer_views = _get_list(document, "bufferViews")
+    views = [_check_view(f"bufferViews[{index}]", view, buffers) for index, view in enumerate(buffer_views)]
+    accessors = _get_list(document, "accessors")
     for index, accessor in enumerate(accessors):
-        _check_accessor(f"accessors[{index}]", accessor, _list(document, "bufferViews"), views)
-    meshes = _list(document, "meshes")
-    sizes = [_mesh_size(f"meshes[{index}]", mesh, document) for index, mesh in enumerate(meshes)]
-    nodes = _list(document, "nodes")
+        _check_accessor(f"accessors[{index}]", accessor, buffer_views, views)
+    meshes = _get_list(document, "meshes")
+    sizes = [_count_mesh(f"meshes[{index}]", mesh, document) for index, mesh in enumerate(meshes)]
+    nodes = _get_list(document, "nodes")
     for index, node in enumerate(nodes):
         if "mesh" in node:
-            _index(f"nodes[{index}]", node, "mesh", len(meshes))
+            _get_index(f"nodes[{index}]", node, "mesh", len(meshes))
     _check_tree(nodes)
-    for index, scene in enumerate(_list(document, "scenes")):
+    for index, scene in enumerate(_get_list(document, "scenes")):
         for root in scene.get("nodes", []):
             _check_index(f"scenes[{index}].nodes", root, len(nodes))
     # What no node places is read all the same, once.
@@ -45,7 +46,7 @@ def check(document: Json, buffers: Sequence[bytes]) -> None:
         )
 
 
-def _list(document: Json, key: str) -> list[Json]:
+def _get_list(document: Json, key: str) -> list[Json]:
     value = document.get(key, [])
     if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
         raise SceneError(f"{key}: must be an array of objects; export it again")
@@ -54,25 +55,25 @@ def _list(document: Json, key: str) -> list[Json]:
 
 def _check_index(where: str, value: Any, count: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < count:
-        raise SceneError(f"{where}: {shown(value)} is none of the {count} that there are; export it again")
+        raise SceneError(f"{where}: {format_value(value)} is none of the {count} that there are; export it again")
     return value
 
 
-def _index(where: str, table: Mapping[str, Any], key: str, count: int) -> int:
+def _get_index(where: str, table: Mapping[str, Any], key: str, count: int) -> int:
     return _check_index(f"{where}.{key}", table.get(key), count)
 
 
-def _whole(where: str, table: Json, key: str, default: int | None = None, least: int = 0) -> int:
+def _get_integer(where: str, table: Json, key: str, default: int | None = None, least: int = 0) -> int:
     value = table.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise SceneError(f"{where}.{key}: {shown(value)} is no whole number from {least} up; export it again")
+        raise SceneError(f"{where}.{key}: {format_value(value)} is no whole number from {least} up; export it again")
     return value
 
 
-def _view(where: str, view: Json, buffers: Sequence[bytes]) -> int:
+def _check_view(where: str, view: Json, buffers: Sequence[bytes]) -> int:
     """The length of a view, which lies within its buffer."""
-    start, length = _whole(where, view, "byteOffset", 0), _whole(where, view, "byteLength", least=1)
-    there = len(buffers[_index(where, view, "buffer", len(buffers))])
+    start, length = _get_integer(where, view, "byteOffset", 0), _get_integer(where, view, "byteLength", least=1)
+    there = len(buffers[_get_index(where, view, "buffer", len(buffers))])
     if start + length > there:
         raise SceneError(f"{where}: ends at byte {start + length} of {there} that there are; export it again")
     return length
@@ -81,28 +82,30 @@ def _view(where: str, view: Json, buffers: Sequence[bytes]) -> int:
 def _check_accessor(where: str, accessor: Json, views: list[Json], lengths: list[int]) -> None:
     kind, form = accessor.get("componentType"), accessor.get("type")
     if kind not in BYTES or form not in COMPONENTS:
-        raise SceneError(f"{where}: no such kind of number: {shown(kind)}, {shown(form)}; export it again")
-    count, start = _whole(where, accessor, "count", least=1), _whole(where, accessor, "byteOffset", 0)
+        raise SceneError(
+            f"{where}: no such kind of number: {format_value(kind)}, {format_value(form)}; export it again"
+        )
+    count, start = _get_integer(where, accessor, "count", least=1), _get_integer(where, accessor, "byteOffset", 0)
     if "bufferView" not in accessor:
         return  # refused where something uses it
-    index = _index(where, accessor, "bufferView", len(views))
+    index = _get_index(where, accessor, "bufferView", len(views))
     item = BYTES[kind] * COMPONENTS[form]
-    stride = _whole(f"bufferViews[{index}]", views[index], "byteStride", item, least=item)
+    stride = _get_integer(f"bufferViews[{index}]", views[index], "byteStride", item, least=item)
     end = start + (count - 1) * stride + item
     if end > lengths[index]:
         raise SceneError(f"{where}: {count} items end at byte {end} of {lengths[index]} in its view; export it again")
 
 
-def _mesh_size(where: str, mesh: Json, document: Json) -> int:
+def _count_mesh(where: str, mesh: Json, document: Json) -> int:
     """Vertices and indices of a mesh."""
-    accessors, total = _list(document, "accessors"), 0
-    for number, primitive in enumerate(_list(mesh, "primitives")):
+    accessors, total = _get_list(document, "accessors"), 0
+    for number, primitive in enumerate(_get_list(mesh, "primitives")):
         name = f"{where}.primitives[{number}]"
         used = {"attributes." + key: value for key, value in primitive["attributes"].items()}
         used |= {"indices": primitive["indices"]} if "indices" in primitive else {}
-        counts = {key: accessors[_index(name, used, key, len(accessors))]["count"] for key in used}
+        counts = {key: accessors[_get_index(name, used, key, len(accessors))]["count"] for key in used}
         if "material" in primitive:
-            _index(name, primitive, "material", len(_list(document, "materials")))
+            _get_index(name, primitive, "material", len(_get_list(document, "materials")))
         total += counts.get("attributes.POSITION", 0) + counts.get("indices", 0)
     return total
 

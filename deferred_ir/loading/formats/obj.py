@@ -70,19 +70,19 @@ def read(path: Path, data: bytes, root: Path | None = None) -> ObjFile:
 
     root: see Assets.
     """
-    text = _decoded(data)
+    text = _decode(data)
     assets = Assets([path.parent], root=root)
     libraries, notes = [], []
     for names in re.findall(r"^[ \t]*mtllib[ \t]+(.*)", text, re.MULTILINE):
-        for name in _library_names(names.strip(), assets):
+        for name in _split_library_names(names.strip(), assets):
             found = assets.path(name)
             if found is None:
                 notes.append(f"{path.name}: its material file {name} is missing")
                 continue
-            libraries.append(_decoded(found.read_bytes()))
+            libraries.append(_decode(found.read_bytes()))
             if found.parent not in assets.folders:
                 assets.folders.append(found.parent)
-    materials = _materials("\n".join(libraries))
+    materials = _read_materials("\n".join(libraries))
     # A value that trimesh does not expect, of whatever key, would cost it all materials: it gets names and images only.
     lines = ((f"newmtl {name}", f"map_Kd {m.image}" if m.image else "") for name, m in materials.items())
     assets.blobs[MATERIALS] = "\n".join(line for pair in lines for line in pair).encode()
@@ -90,7 +90,7 @@ def read(path: Path, data: bytes, root: Path | None = None) -> ObjFile:
     if missing := sorted(used - materials.keys()):
         notes.append(f"{path.name}: no material {', '.join(missing)}; its surfaces are grey")
     text = re.sub(r"^.*\bmtllib\b.*$", "", text, flags=re.MULTILINE)
-    text = f"mtllib {MATERIALS}\n{_with_absolute_indices(text)}"
+    text = f"mtllib {MATERIALS}\n{_make_indices_make_absolute(text)}"
     if re.search(r"^f[^\n#]*[ \t/](0+|-\d+)(?![\d.])", text, re.MULTILINE):
         raise SceneError(
             f"{path}: a face has index 0, or one before the first vertex; export it again, counting from 1"
@@ -98,7 +98,7 @@ def read(path: Path, data: bytes, root: Path | None = None) -> ObjFile:
     return ObjFile(text.encode(), assets, materials, tuple(notes))
 
 
-def _decoded(data: bytes) -> str:
+def _decode(data: bytes) -> str:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -106,12 +106,12 @@ def _decoded(data: bytes) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def _library_names(names: str, assets: Assets) -> list[str]:
+def _split_library_names(names: str, assets: Assets) -> list[str]:
     """The files of one `mtllib` line: one name with spaces, or several names."""
     return [names] if assets.path(names) or " " not in names else names.split()
 
 
-def _materials(mtl: str) -> dict[str, MtlMaterial]:
+def _read_materials(mtl: str) -> dict[str, MtlMaterial]:
     """The materials of an MTL text by name; of two of one name the later counts."""
     materials: dict[str, MtlMaterial] = {}
     name = ""
@@ -122,15 +122,15 @@ def _materials(mtl: str) -> dict[str, MtlMaterial]:
             name = " ".join(value.split())
             materials[name] = MtlMaterial()
         elif name and key == "kd":
-            materials[name] = replace(materials[name], kd=_numbers(value))
+            materials[name] = replace(materials[name], kd=_parse_numbers(value))
         elif name and key == "map_kd" and value.strip():
             materials[name] = replace(materials[name], image=without_options(value).strip())
         elif name and key == "ke":
-            materials[name] = replace(materials[name], emits=any(number > 0 for number in _numbers(value)))
+            materials[name] = replace(materials[name], emits=any(number > 0 for number in _parse_numbers(value)))
     return materials
 
 
-def _numbers(text: str) -> tuple[float, ...]:
+def _parse_numbers(text: str) -> tuple[float, ...]:
     """The numbers of a line up to a comment; none where something else stands there, such as `spectral file.rfl`."""
     try:
         return tuple(float(word) for word in text.partition("#")[0].split())
@@ -138,7 +138,7 @@ def _numbers(text: str) -> tuple[float, ...]:
         return ()
 
 
-def _with_absolute_indices(text: str) -> str:
+def _make_indices_make_absolute(text: str) -> str:
     """The text with negative face indices, which count back from the latest vertex, turned into plain ones."""
     if not re.search(r"^[ \t]*f[^\n#]*[ \t/]-\d", text, re.MULTILINE):
         return text
@@ -152,11 +152,11 @@ def _with_absolute_indices(text: str) -> str:
             counts[words[0]] += 1
         elif words[0] == "f":
             totals = tuple(counts.values())
-            lines[number] = " ".join(["f", *(_absolute(word, totals) for word in words[1:])])
+            lines[number] = " ".join(["f", *(_make_absolute(word, totals) for word in words[1:])])
     return "\n".join(lines)
 
 
-def _absolute(reference: str, totals: tuple[int, ...]) -> str:
+def _make_absolute(reference: str, totals: tuple[int, ...]) -> str:
     """One vertex of a face, such as `-4/-4/-1`, with the numbers of vertices, uvs and normals so far."""
     parts = reference.split("/")
     for place, (part, total) in enumerate(zip(parts, totals, strict=False)):

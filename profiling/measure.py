@@ -8,6 +8,7 @@ from typing import TypeVar
 from deferred_ir.base.progress import track
 from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
+from deferred_ir.gl.context import Gpu
 from deferred_ir.graph.graph import Plan
 from deferred_ir.scene.scene import Scene
 
@@ -46,3 +47,11 @@ def time_frames(
     for name, renderer in renderers.items():
         renderer.finish(measurements[name])
     return measurements
+
+
+def name_device(device: str) -> str:
+    """Return the name (GL_RENDERER) of a device, which has to be opened for that."""
+    gpu = Gpu(device)
+    name = gpu.device.name
+    gpu.close()
+    return name

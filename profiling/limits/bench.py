@@ -22,12 +22,11 @@ from typing import Any
 from deferred_ir.base.errors import Error
 from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
-from deferred_ir.gl.context import Gpu
 from deferred_ir.loading.load import load
 from deferred_ir.profiling.figures import markdown
 from deferred_ir.profiling.limits.host_costs import cold_start, python_time
 from deferred_ir.profiling.limits.passes import FOLDER, LIMITS
-from deferred_ir.profiling.measure import time_frames
+from deferred_ir.profiling.measure import name_device, time_frames
 from deferred_ir.profiling.study import command_line
 from deferred_ir.scene.scene import Scene
 
@@ -124,14 +123,11 @@ def report(words: Sequence[str] | None = None) -> str:
     if not rows:
         parser.error(f"--only {chosen.only}: in none of: {'; '.join((*COMPARISONS, *HOST))}")
     options = {"vpls": chosen.vpls, "size": chosen.size, "turns": chosen.turns, "device": chosen.device}
-    gpu = Gpu(chosen.device)
-    device = gpu.device.name
-    gpu.close()
     columns = [column(name, rows, **options) for name in chosen.scenes]
     head, *body = zip(["", *rows], *columns, strict=True)
     conditions = (
-        f"{device}; {os.cpu_count()} cores, Python {platform.python_version()}. {chosen.turns} turns with "
-        f"{chosen.vpls} VPLs at {chosen.size[0]}x{chosen.size[1]}; median (quartiles)."
+        f"{name_device(chosen.device)}; {os.cpu_count()} cores, Python {platform.python_version()}. "
+        f"{chosen.turns} turns with {chosen.vpls} VPLs at {chosen.size[0]}x{chosen.size[1]}; median (quartiles)."
     )
     return f"{markdown(head, body)}\n\n{conditions}"
 

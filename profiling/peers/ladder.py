@@ -88,7 +88,7 @@ def run(course: Course, folder: Path, names: Sequence[str]) -> Peers:
             print(f"note: peer {name}: {notes[name]}", file=sys.stderr)
     if names:
         peer_points.save_notes(folder, notes)
-    return Peers(peer_points.ordered(points), notes)
+    return Peers(peer_points.sort(points), notes)
 
 
 def _measured(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
@@ -150,5 +150,5 @@ def _point(course: Course, key: PeerKey, process: peer_process.PeerProcess) -> P
         relmse=trimmed,
         relmse_untrimmed=untrimmed,
         bias=metrics.bias(image, truth.radiance, truth.hit),
-        relmse_masked=metrics.masked_relmse(image, truth.radiance, course.mask.kept),
+        relmse_masked=metrics.masked_relmse(image, truth.radiance, course.mask.counts),
     )

@@ -119,7 +119,7 @@ def merge(
         save_notes(target, notes)
     for point in points.values():
         save(target, point)
-    return Peers(ordered(points.values()), notes), broken
+    return Peers(sort(points.values()), notes), broken
 
 
 def _notes(file: Path) -> dict[str, str]:
@@ -130,6 +130,6 @@ def _notes(file: Path) -> dict[str, str]:
     return {name: str(data[name]) for name in NAMES if name in data} if isinstance(data, dict) else {}
 
 
-def ordered(points: Iterable[PeerPoint]) -> list[PeerPoint]:
+def sort(points: Iterable[PeerPoint]) -> list[PeerPoint]:
     """By peer, paths and seed."""
     return sorted(points, key=lambda point: (NAMES.index(point.key.peer), point.key.spp, point.key.seed))

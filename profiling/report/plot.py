@@ -1,4 +1,4 @@
-"""The plot of a sweep: error against run time."""
+"""The plot of a sweep: error against frame time."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from deferred_ir.profiling.sweep.equal_error import Rung
 from deferred_ir.profiling.sweep.groups import Group
 
 
-def svg(groups: Sequence[Group], title: str, peers: Sequence[Rung] = ()) -> str:
-    """relMSE over frame time, log-log: means with the span over the seeds, the Pareto front ringed and joined.
+def draw_svg(groups: Sequence[Group], title: str, peers: Sequence[Rung] = ()) -> str:
+    """Draw relMSE over frame time, log-log: means with the span over the seeds, and the Pareto front. Returns SVG.
 
-    peers: with squares, and then all errors are masked, `groups` too.
+    peers: drawn with squares; with peers all errors have to be masked, those of `groups` as well.
     """
     import matplotlib as mpl
     from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -25,20 +25,10 @@ def svg(groups: Sequence[Group], title: str, peers: Sequence[Rung] = ()) -> str:
     panel = figure.add_subplot()
     for graph in dict.fromkeys(group.graph for group in groups):
         line = sorted((group for group in groups if group.graph == graph), key=lambda group: group.vpls)
-        means = [group.relmse for group in line]
-        below = [group.relmse - group.relmse_low for group in line]
-        above = [group.relmse_high - group.relmse for group in line]
-        panel.errorbar([g.frame_ms for g in line], means, (below, above), fmt="o-", ms=4, capsize=3, label=graph)
-        for group in line:
-            panel.annotate(f"{group.vpls}", (group.frame_ms, group.relmse), (5, 4), textcoords="offset points", size=8)
+        _draw_line(panel, graph, [(group.frame_ms, group.vpls, group) for group in line], fmt="o-", lw=1.5, size=8)
     for peer in dict.fromkeys(rung.peer for rung in peers):
-        ladder = [rung for rung in peers if rung.peer == peer]
-        means = [rung.relmse for rung in ladder]
-        below = [rung.relmse - rung.relmse_low for rung in ladder]
-        above = [rung.relmse_high - rung.relmse for rung in ladder]
-        panel.errorbar([r.ms for r in ladder], means, (below, above), fmt="s--", ms=4, lw=1, capsize=3, label=peer)
-        for rung in ladder:
-            panel.annotate(f"{rung.spp}", (rung.ms, rung.relmse), (5, 4), textcoords="offset points", size=6)
+        ladder = [(rung.ms, rung.spp, rung) for rung in peers if rung.peer == peer]
+        _draw_line(panel, peer, ladder, fmt="s--", lw=1, size=6)
     front = sorted((group for group in groups if group.pareto), key=lambda group: group.frame_ms)
     style: dict[str, Any] = {"color": "black", "lw": 0.8, "ls": ":", "marker": "o", "mfc": "none", "ms": 10}
     panel.plot([group.frame_ms for group in front], [group.relmse for group in front], label="Pareto front", **style)
@@ -55,6 +45,18 @@ def svg(groups: Sequence[Group], title: str, peers: Sequence[Rung] = ()) -> str:
     panel.grid(alpha=0.3, which="both")
     panel.legend(fontsize=8)
     out = io.StringIO()
-    with mpl.rc_context({"svg.hashsalt": "profile"}):  # the same figures give the same file
+    with mpl.rc_context({"svg.hashsalt": "profile"}):  # so that the same figures give the same file
         figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     return out.getvalue()
+
+
+def _draw_line(
+    panel: Any, label: str, points: Sequence[tuple[float, int, Group | Rung]], *, fmt: str, lw: float, size: int
+) -> None:
+    """Draw (milliseconds, number beside the point, errors) with the span over the seeds."""
+    means = [errors.relmse for *_, errors in points]
+    below = [errors.relmse - errors.relmse_low for *_, errors in points]
+    above = [errors.relmse_high - errors.relmse for *_, errors in points]
+    panel.errorbar([ms for ms, *_ in points], means, (below, above), fmt=fmt, ms=4, lw=lw, capsize=3, label=label)
+    for ms, number, errors in points:
+        panel.annotate(f"{number}", (ms, errors.relmse), (5, 4), textcoords="offset points", size=size)

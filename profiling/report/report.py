@@ -1,27 +1,28 @@
-"""The files of a sweep: tables, a plot, a trace and a page that needs no network, all made from its points."""
+"""The files of a sweep's report: tables, a plot, a trace and an HTML page that needs no network."""
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.errors import SettingError
 from deferred_ir.base.files import write_json
-from deferred_ir.profiling.peers.points import Peers
 from deferred_ir.profiling.report import tables
-from deferred_ir.profiling.report.plot import svg
-from deferred_ir.profiling.sweep import edge_mask, equal_error, points
-from deferred_ir.profiling.sweep.groups import advise, flagged, grouped
+from deferred_ir.profiling.report.plot import draw_svg
+from deferred_ir.profiling.sweep import equal_error, points
+from deferred_ir.profiling.sweep.equal_error import Row, Rung
+from deferred_ir.profiling.sweep.groups import Group, advise, group_points, is_flagged
 from deferred_ir.profiling.sweep.points import Point
-from deferred_ir.profiling.sweep.reference import SHARE
+from deferred_ir.profiling.sweep.reference import MOST_NOISE
+from deferred_ir.profiling.sweep.run import Results
 
 
 def check_libraries() -> None:
-    """Raise SettingError if what the report is made with is not installed: better before the work than after it."""
+    """Raise SettingError if a library of the report is not installed: better before the work than after it."""
     try:
         import jinja2
         import matplotlib as mpl
@@ -30,56 +31,67 @@ def check_libraries() -> None:
     del jinja2, mpl
 
 
-def write_all(folder: Path, found: Sequence[Point], peers: Peers) -> str:
-    """Write every file of the report for these points, at least one, and what there is of peers; advice in a sentence.
+@dataclass(frozen=True, eq=False)
+class _Figures:
+    """What the report computes from the points. compared: the groups with the errors that peers have as well."""
 
-    The mask of pixels that count is taken from the folder.
-    """
-    first = found[0]
-    groups = grouped(found)
-    rungs = equal_error.rungs(peers.points)
-    compared = grouped(found, masked=True) if rungs else groups
-    equal = equal_error.rows(compared, rungs, first.reference_noise)
-    rows = [*map(tables.row, found), *map(tables.peer_row, peers.points)]
+    groups: Sequence[Group]
+    compared: Sequence[Group]
+    rungs: Sequence[Rung]
+    equal: Sequence[Row]
+    stateful: Mapping[str, int]
+
+
+def write_all(folder: Path, results: Results) -> str:
+    """Write every file of the report. Returns the recommendation, one sentence."""
+    measured = results.points
+    figures = _compute(results)
+    about = _describe(results)
+    rows = [*map(tables.row, measured), *map(tables.peer_row, results.peers.points)]
     tables.write_csv(folder / "error_vs_time.csv", rows)
-    tables.write_csv(folder / "passes.csv", tables.pass_rows(found))
-    mask = edge_mask.read(folder, first.key.scene_hash, (first.key.size[0], first.key.size[1]))
-    about = {
+    tables.write_csv(folder / "passes.csv", tables.pass_rows(measured))
+    data = {
+        **about,
+        "rows": rows,
+        "groups": [asdict(group) for group in figures.groups],
+        "peers": [asdict(rung) for rung in figures.rungs],
+        "peer_notes": dict(results.peers.notes),
+        "equal_error": [row.as_dict() for row in figures.equal],
+    }
+    write_json(folder / "error_vs_time.json", data)
+    plot = draw_svg(figures.compared, measured[0].scene, figures.rungs)
+    tables.write_text(folder / "error_vs_time.svg", plot)
+    write_json(folder / "trace.json", tables.trace(measured))
+    advice = advise(figures.groups)
+    tables.write_text(folder / "report.html", _render_page(folder, results, figures, about, plot=plot, advice=advice))
+    return advice
+
+
+def _compute(results: Results) -> _Figures:
+    groups = group_points(results.points)
+    rungs = equal_error.group_rungs(results.peers.points)
+    compared = group_points(results.points, masked=True) if rungs else groups
+    equal = equal_error.rows(compared, rungs, results.points[0].reference_noise)
+    return _Figures(groups, compared, rungs, equal, equal_error.find_stateful(compared))
+
+
+def _describe(results: Results) -> dict[str, Any]:
+    """Return what all points have in common."""
+    first = results.points[0]
+    return {
         "scene": first.scene,
         "scene_hash": first.key.scene_hash,
         "time": first.time,
         "size": first.key.size,
         "reference": {"hash": first.reference, "noise": first.reference_noise},
-        "devices": sorted({point.device for point in found}),
+        "devices": sorted({point.device for point in results.points}),
         "flip_parameters": first.flip_parameters,
-        "left_out_by_mask": mask.left_out if mask else None,
+        "left_out_by_mask": results.mask.left_out if results.mask else None,
     }
-    told = {
-        **about,
-        "rows": rows,
-        "groups": [asdict(group) for group in groups],
-        "peers": [asdict(rung) for rung in rungs],
-        "peer_notes": dict(peers.notes),
-        "equal_error": [row.as_dict() for row in equal],
-    }
-    write_json(folder / "error_vs_time.json", told)
-    plot = svg(compared, first.scene, rungs)
-    tables.write_text(folder / "error_vs_time.svg", plot)
-    write_json(folder / "trace.json", tables.trace(found))
-    advice = advise(groups)
-    figures = {"groups": groups, "rungs": rungs, "equal": equal, "notes": peers.notes}
-    tables.write_text(folder / "report.html", _page(folder, found, about, plot=plot, advice=advice, figures=figures))
-    return advice
 
 
-def _page(
-    folder: Path,
-    found: Sequence[Point],
-    about: Mapping[str, Any],
-    *,
-    plot: str,
-    advice: str,
-    figures: Mapping[str, Any],
+def _render_page(
+    folder: Path, results: Results, figures: _Figures, about: Mapping[str, Any], *, plot: str, advice: str
 ) -> str:
     import jinja2
 
@@ -87,31 +99,34 @@ def _page(
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    left_out = {(point.graph, entry.what): entry for point in found for entry in point.left_out}
-    pictured = [point for point in found if point.pictures]
-    pictures = [
-        {
-            "title": f"{point.graph}, {point.key.vpls} VPLs",
-            "relmse": point.relmse,
-            "bias": point.bias,
-            "images": [_data_uri(points.path(folder, point.key.name, suffix)) for suffix in points.PICTURES],
-        }
-        for point in pictured
-    ]
+    left_out = {(point.graph, entry.what): entry for point in results.points for entry in point.left_out}
     return environment.from_string(source).render(
         about=about,
         advice=advice,
-        plot=plot[plot.index("<svg") :],  # without the XML header, which stands only at a file's beginning
-        pictures=pictures,
-        passes=tables.pass_rows(found),
+        plot=plot[plot.index("<svg") :],  # without the XML header, which may only stand at a file's beginning
+        pictures=[_picture(folder, point) for point in results.points if point.pictures],
+        passes=tables.pass_rows(results.points),
         left_out=[(graph, entry) for (graph, _), entry in left_out.items()],
-        software=any(point.software for point in found),
-        flip_notes=sorted({point.flip_note for point in found if point.flip_note}),
-        noisy=sum(flagged(point) for point in found),
-        total=len(found),
-        share=SHARE,
-        **figures,
+        software=any(point.software for point in results.points),
+        flip_notes=sorted({point.flip_note for point in results.points if point.flip_note}),
+        flagged=sum(map(is_flagged, results.points)),
+        total=len(results.points),
+        most_noise=MOST_NOISE,
+        groups=figures.groups,
+        rungs=figures.rungs,
+        equal=figures.equal,
+        stateful=figures.stateful,
+        notes=results.peers.notes,
     )
+
+
+def _picture(folder: Path, point: Point) -> dict[str, Any]:
+    return {
+        "title": f"{point.graph}, {point.key.vpls} VPLs",
+        "relmse": point.relmse,
+        "bias": point.bias,
+        "images": [_data_uri(points.path(folder, point.key.name, suffix)) for suffix in points.PICTURES],
+    }
 
 
 def _data_uri(file: Path) -> str:

@@ -1,4 +1,4 @@
-"""The tables of a sweep: a row a point, of peers too, the time of each pass, and a trace."""
+"""The tables of a sweep: a row for each point, ours and the peers', the time of each pass, and a trace."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from typing import Any
 
 from deferred_ir.base.files import write_whole
 from deferred_ir.profiling.peers.points import PeerPoint
-from deferred_ir.profiling.sweep.groups import flagged, noisy
+from deferred_ir.profiling.sweep.groups import is_flagged, is_noisy
 from deferred_ir.profiling.sweep.points import Point
 
 NOISY = "reference_noise"
 
 
 def row(point: Point) -> dict[str, Any]:
-    """A point of ours as a row."""
+    """Return a row for a point of ours."""
     return {
         "graph": point.graph,
         "vpls": point.key.vpls,
@@ -29,7 +29,7 @@ def row(point: Point) -> dict[str, Any]:
         "bias": point.bias,
         "flip": point.flip,
         "memory": sum(point.memory.values()),
-        "flagged": NOISY if flagged(point) else "",
+        "flagged": NOISY if is_flagged(point) else "",
         "vpls_alive": point.vpls_alive,
         "scene_hash": point.key.scene_hash,
         "graph_hash": point.key.graph_hash,
@@ -40,8 +40,8 @@ def row(point: Point) -> dict[str, Any]:
 
 
 def peer_row(point: PeerPoint) -> dict[str, Any]:
-    """A point of a peer as a row with the same columns: its name is the graph, its version the device."""
-    doubtful = point.relmse_masked is not None and noisy(point.reference_noise, point.relmse_masked)
+    """Return a row for a peer's point, with the same columns: its name is the graph, its version the device."""
+    doubtful = point.relmse_masked is not None and is_noisy(point.reference_noise, point.relmse_masked)
     return {
         "graph": point.key.peer,
         "vpls": None,
@@ -62,11 +62,11 @@ def peer_row(point: PeerPoint) -> dict[str, Any]:
     }
 
 
-def pass_rows(found: Iterable[Point]) -> list[dict[str, Any]]:
-    """Quartiles of each pass over frames and seeds, of their sum in a frame, and of the wall time of whole frames."""
+def pass_rows(points: Iterable[Point]) -> list[dict[str, Any]]:
+    """Return quartiles over frames and seeds: of each pass, of a frame's sum of passes, and of its wall time."""
     times: dict[tuple[str, int], dict[str, list[tuple[float, float]]]] = {}
     walls: dict[tuple[str, int], list[float]] = {}
-    for point in found:
+    for point in points:
         group = point.graph, point.key.vpls
         walls.setdefault(group, []).extend(point.frames)
         passes = times.setdefault(group, {})
@@ -93,10 +93,10 @@ def _quartiles(name: str, values: Sequence[float]) -> dict[str, float]:
     return {f"{name}_q1": round(low, 4), f"{name}_median": round(median(values), 4), f"{name}_q3": round(high, 4)}
 
 
-def trace(found: Sequence[Point]) -> dict[str, Any]:
-    """Chrome trace events: of each graph one frame, that of the first seed with the most VPLs; CPU and GPU tracks."""
+def trace(points: Sequence[Point]) -> dict[str, Any]:
+    """Return Chrome trace events: the median frame of each graph with the most VPLs and the first seed, CPU and GPU."""
     events: list[dict[str, Any]] = []
-    best = {point.graph: point for point in sorted(found, key=lambda point: (point.key.vpls, -point.key.seed))}
+    best = {point.graph: point for point in sorted(points, key=lambda point: (point.key.vpls, -point.key.seed))}
     for process, (graph, point) in enumerate(best.items(), start=1):
         middle = min(range(len(point.frames)), key=lambda i: abs(point.frames[i] - point.frame_ms))
         title = f"{graph}, {point.key.vpls} VPLs"
@@ -114,7 +114,7 @@ def trace(found: Sequence[Point]) -> dict[str, Any]:
 
 
 def write_csv(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows with the columns of the first, at least one."""
+    """Write rows, at least one, with the columns of the first."""
     out = io.StringIO()
     writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
     writer.writeheader()

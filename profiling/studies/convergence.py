@@ -26,7 +26,7 @@ from deferred_ir.profiling.peers import ladder
 from deferred_ir.profiling.study import command_line, run
 from deferred_ir.profiling.sweep import edge_mask, reference
 from deferred_ir.profiling.sweep.edge_mask import Mask
-from deferred_ir.profiling.sweep.equal_error import TARGETS, Rung, reach, rungs
+from deferred_ir.profiling.sweep.equal_error import TARGETS, Rung, group_rungs, reach
 from deferred_ir.profiling.sweep.reference import Truth
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import masked_relmse
@@ -50,7 +50,7 @@ def measure(scene: Scene, graph: str, *, size: tuple[int, int], vpls: int, truth
             mean.draw()
             spent += clock.perf_counter() - start
             if frame in FRAMES:
-                error = masked_relmse(mean.image().radiance, truth.radiance, mask.kept)
+                error = masked_relmse(mean.image().radiance, truth.radiance, mask.counts)
                 points.append((frame, spent * 1e3, float("nan") if error is None else error))
     return points
 
@@ -108,7 +108,7 @@ def report(chosen: argparse.Namespace) -> None:
     options = {"size": size, "vpls": chosen.vpls, "truth": truth, "mask": mask}
     lines = {graph: measure(scene, graph, **options) for graph in chosen.graphs}
     course = ladder.Course(scene, size, 1, truth, mask)
-    peers = rungs(ladder.run(course, folder, ladder.choose(chosen.peers)).points)
+    peers = group_rungs(ladder.run(course, folder, ladder.choose(chosen.peers)).points)
     write_json(folder / "convergence.json", {"vpls": chosen.vpls, "noise": truth.noise, "lines": lines})
     plot(f"{scene.name}, {chosen.vpls} VPLs a frame", lines, peers, folder / f"convergence-{scene.name}.svg")
     print(tables(lines, peers))

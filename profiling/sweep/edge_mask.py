@@ -1,8 +1,8 @@
-"""Pixels in which something ends: left out where renderers are compared that do not agree on what a pixel is.
+"""Find pixels with an edge inside, to leave them out where renderers with different pixel filters are compared.
 
-A pixel is the radiance at its centre here, and the mean over its area for path tracers. Both are the same as long as
-nothing within the pixel jumps: so rays go through a lattice over each pixel, its border included, and where two
-neighbours of the lattice differ in surface, albedo or light the pixel does not count, for anyone.
+Our pixel is the radiance at its centre, a path tracer's is the mean over its area. Both agree as long as nothing within
+the pixel jumps. So rays are traced through a lattice over each pixel, its border included, and a pixel is left out for
+all renderers if two neighbours of the lattice differ in surface, albedo or light.
 """
 
 from __future__ import annotations
@@ -27,35 +27,35 @@ FILE, PICTURE = "mask.npy", "mask.png"
 STEPS = 4
 """Steps of the lattice along a pixel's edge."""
 BEND = np.radians(6.0)
-"""Largest angle between neighbours' normals, and of the way from one to the other with their planes, on one surface."""
+"""Largest angle between neighbours' normals on one surface, and between the line through them and their planes."""
 JUMP = 0.05
-"""Largest difference of neighbours' albedo, as a part of the larger one."""
+"""Largest difference of neighbours' albedos, as a fraction of the larger one."""
 ROWS = 16
-"""Rows of pixels at once, for memory."""
+"""Rows of pixels that are processed together; limits memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class Mask:
-    """kept: bool (H, W), top row first, the pixels that count: all of such a pixel is one lit or one unlit surface."""
+    """The pixels that count. counts: bool (H, W), top row first: one surface, all lit or all unlit."""
 
-    kept: Bools
+    counts: Bools
 
     @property
     def left_out(self) -> float:
-        """The share of the pixels that does not count."""
-        return 1.0 - float(self.kept.mean())
+        """The fraction of the pixels that do not count."""
+        return 1.0 - float(self.counts.mean())
 
     @property
     def hash(self) -> str:
         """First 16 hex digits of SHA-256 over the pixels."""
-        return hashlib.sha256(np.packbits(self.kept).tobytes()).hexdigest()[:16]
+        return hashlib.sha256(np.packbits(self.counts).tobytes()).hexdigest()[:16]
 
 
 @dataclass(frozen=True, eq=False)
 class _Lattice:
-    """What rays through a lattice meet, all (rows, columns, ...): position, geometric and shading normal, albedo.
+    """Hits of the rays through a lattice, all (rows, columns, ...): position, geometric and shading normal, albedo.
 
-    material: -1 where there is nothing. lit: the spotlight reaches the point.
+    material: -1 where a ray hits nothing. lit: whether the spotlight reaches the point.
     """
 
     position: Array
@@ -65,24 +65,24 @@ class _Lattice:
     material: Any
     lit: Bools
 
-    def part(self, rows: slice, columns: slice) -> _Lattice:
+    def crop(self, rows: slice, columns: slice) -> _Lattice:
         return _Lattice(*(value[rows, columns] for value in vars(self).values()))
 
 
 def find(scene: Scene, size: tuple[int, int], progress: Progress | None = None) -> Mask:
-    """The mask of `scene` at time 0 for images of `size` (width, height). DeviceError without embreex."""
+    """Find the mask of `scene` at time 0 for images of `size` (width, height). Raises DeviceError without embreex."""
     scene = scene.at(0.0)
     tracer = Tracer(scene)
     blocks = []
     for row in range(0, size[1], ROWS):
-        blocks.append(_kept(_seen(scene, tracer, size, row, min(row + ROWS, size[1]))))
+        blocks.append(_find_whole(_trace(scene, tracer, size, row, min(row + ROWS, size[1]))))
         if progress:
             progress(min(row + ROWS, size[1]), size[1])
     return Mask(np.concatenate(blocks))
 
 
-def _seen(scene: Scene, tracer: Tracer, size: tuple[int, int], first: int, last: int) -> _Lattice:
-    """The lattice over the rows of pixels `first` to `last` - 1."""
+def _trace(scene: Scene, tracer: Tracer, size: tuple[int, int], first: int, last: int) -> _Lattice:
+    """Trace the lattice over the rows of pixels `first` to `last` - 1."""
     width, height = size
     a, b, c = scene.camera.ray_axes(size)
     x = np.arange(STEPS * width + 1) / (STEPS * width) * 2 - 1
@@ -103,26 +103,26 @@ def _seen(scene: Scene, tracer: Tracer, size: tuple[int, int], first: int, last:
     return _Lattice(*(value.reshape(*shape, *value.shape[1:]) for value in values))
 
 
-def _kept(lattice: _Lattice) -> Bools:
-    """The pixels of these rows that count."""
+def _find_whole(lattice: _Lattice) -> Bools:
+    """Return the pixels of these rows without an edge inside, bool (rows, W)."""
     everything = slice(None)
-    across = _differ(lattice.part(everything, slice(-1)), lattice.part(everything, slice(1, None)))
-    down = _differ(lattice.part(slice(-1), everything), lattice.part(slice(1, None), everything))
+    across = _differ(lattice.crop(everything, slice(-1)), lattice.crop(everything, slice(1, None)))
+    down = _differ(lattice.crop(slice(-1), everything), lattice.crop(slice(1, None), everything))
     nothing = lattice.material < 0
-    # Steps along and between the lines of a pixel's lattice; those on its border are its neighbour's, too.
+    # Steps along the lines of a pixel's lattice and between them; the lines on its border are its neighbour's as well.
     edges = _any(across, STEPS + 1, STEPS) | _any(down, STEPS, STEPS + 1) | _any(nothing, STEPS + 1, STEPS + 1)
     return ~edges
 
 
 def _any(flags: Bools, tall: int, wide: int) -> Bools:
-    """Whether any of the `tall` x `wide` flags of a pixel is set, pixels being STEPS apart."""
+    """Return whether any of the `tall` x `wide` flags of each pixel is set; pixels are STEPS apart."""
     blocks: Any = np.lib.stride_tricks.sliding_window_view(flags, (tall, wide))[::STEPS, ::STEPS]
     result: Bools = blocks.any(axis=(-1, -2))
     return result
 
 
 def _differ(one: _Lattice, other: _Lattice) -> Bools:
-    """Where something lies between two points of the lattice."""
+    """Return where an edge lies between two points of the lattice."""
     way = other.position - one.position
     length = np.linalg.norm(way, axis=-1)
     off_plane = np.maximum(np.abs((way * one.normal).sum(-1)), np.abs((way * other.normal).sum(-1)))
@@ -141,7 +141,7 @@ def _differ(one: _Lattice, other: _Lattice) -> Bools:
 
 
 def load_or_find(folder: Path, scene: Scene, size: tuple[int, int], progress: Progress | None = None) -> Mask:
-    """The mask kept in `folder`, or a new one, kept there."""
+    """Load the mask in `folder`, or find it and save it there."""
     mask = read(folder, scene.hash, size)
     if mask is None:
         mask = find(scene, size, progress)
@@ -150,30 +150,30 @@ def load_or_find(folder: Path, scene: Scene, size: tuple[int, int], progress: Pr
 
 
 def save(folder: Path, mask: Mask, scene_hash: str) -> None:
-    """Write the mask, its picture (white: counts) and what it belongs to; each file appears whole or not at all."""
-    height, width = mask.kept.shape
+    """Write the mask, a picture of it (white pixels count) and its record; each file appears whole or not at all."""
+    height, width = mask.counts.shape
     record = {"scene_hash": scene_hash, "size": [width, height], "left_out": mask.left_out, "image_hash": mask.hash}
-    Image(None, np.repeat(np.where(mask.kept, 255, 0).astype(np.uint8)[..., None], 3, axis=2)).save(folder / PICTURE)
+    Image(None, np.repeat(np.where(mask.counts, 255, 0).astype(np.uint8)[..., None], 3, axis=2)).save(folder / PICTURE)
 
     def fill(part: Path) -> None:
         with part.open("wb") as file:
-            np.save(file, mask.kept)
+            np.save(file, mask.counts)
         write_json(metadata_path(folder / FILE), record)
 
     write_whole(folder / FILE, fill)
 
 
 def read(folder: Path, scene_hash: str, size: tuple[int, int]) -> Mask | None:
-    """What an earlier run left, if it is whole and of this scene and size."""
+    """Load the mask of an earlier run. Returns None unless it is complete and of this scene and size."""
     file = folder / FILE
     try:
         with file.open("rb") as stream:
-            kept = np.load(stream)
+            counts = np.load(stream)
         record = read_metadata(file, size)
     except (OSError, ValueError, EOFError, SettingError):
         return None  # it is made again
-    if kept.dtype != np.bool_ or kept.shape != (size[1], size[0]) or not (folder / PICTURE).is_file():
+    if counts.dtype != np.bool_ or counts.shape != (size[1], size[0]) or not (folder / PICTURE).is_file():
         return None
-    mask = Mask(kept)
+    mask = Mask(counts)
     whole = record.get("scene_hash") == scene_hash and record.get("image_hash") == mask.hash
     return mask if whole else None

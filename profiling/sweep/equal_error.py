@@ -1,4 +1,8 @@
-"""The time that renderers need for the same error, read off what was measured: interpolated, never extrapolated."""
+"""The time that renderers need for the same error, interpolated between measured points and never extrapolated.
+
+Graphs that fill state over several frames are left out: their frame times are those of a filled set, and a single image
+would take all the frames before as well.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ from statistics import mean
 from typing import Any
 
 from deferred_ir.profiling.peers.points import PeerPoint
-from deferred_ir.profiling.sweep.groups import Group, noisy
+from deferred_ir.profiling.sweep.groups import Group, is_noisy
 
 TARGETS = (0.1, 0.03, 0.01, 0.003)
 """Masked relMSE for which times are given."""
@@ -18,7 +22,7 @@ TARGETS = (0.1, 0.03, 0.01, 0.003)
 
 @dataclass(frozen=True)
 class Rung:
-    """All seeds of a peer and a number of paths a pixel: means of time [ms] and masked relMSE, and that one's range."""
+    """All seeds of a peer and a number of paths a pixel: mean time [ms], mean masked relMSE and its range."""
 
     peer: str
     spp: int
@@ -32,9 +36,10 @@ class Rung:
 
 @dataclass(frozen=True)
 class Reach:
-    """The time at which a front has an error: `ms`, or at most that if even its fastest choice is better.
+    """The time `ms` that a graph or peer needs for an error.
 
-    Where it never is as good, ms is None, `floor` the least error that was measured and `beyond` the time of that.
+    at_most: its fastest point is already better, so `ms` is an upper bound. ms: None if it never reaches the error;
+    then `floor` is its least measured error and `beyond` the time of that.
     """
 
     name: str
@@ -44,7 +49,7 @@ class Reach:
     beyond: float
 
     def __str__(self) -> str:
-        """As a table shows it."""
+        """Format for a table."""
         if self.ms is None:
             return f"not reached, floor = {self.floor:.2g}"
         return f"{'at most ' if self.at_most else ''}{self.ms:.3g} ms"
@@ -52,7 +57,7 @@ class Reach:
 
 @dataclass(frozen=True)
 class Row:
-    """One error. ours: of our fastest graph at it, None where nothing of ours was measured. noisy: the reference is."""
+    """One error. ours: the time of our fastest graph, None if none was measured. noisy: the reference is too noisy."""
 
     relmse: float
     ours: Reach | None
@@ -60,11 +65,11 @@ class Row:
     noisy: bool
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data for JSON."""
+        """Return plain data for JSON."""
         return {**asdict(self), "speedup": {peer: self.speedup(peer) or None for peer in self.peers}}
 
     def speedup(self, peer: str) -> str:
-        """How many times as long the peer takes, as a table shows it; empty where that cannot be told."""
+        """Format how many times as long the peer takes for a table; empty if it is unknown."""
         ours, theirs = self.ours, self.peers[peer]
         if ours is None or ours.ms is None:
             return ""
@@ -76,50 +81,63 @@ class Row:
         return f"{bound}{theirs.ms / ours.ms:.3g}x"
 
 
-def rungs(points: Iterable[PeerPoint]) -> list[Rung]:
-    """Points by peer and paths, without those of scenes in which no pixel counts."""
+def group_rungs(points: Iterable[PeerPoint]) -> list[Rung]:
+    """Group points by peer and number of paths. Points without a masked error are left out."""
     seeds: dict[tuple[str, int], list[PeerPoint]] = {}
     for point in points:
         seeds.setdefault((point.key.peer, point.key.spp), []).append(point)
-    made = []
-    for (peer, spp), many in seeds.items():
-        errors = [point.relmse_masked for point in many if point.relmse_masked is not None]
+    rungs = []
+    for (peer, spp), members in seeds.items():
+        errors = [point.relmse_masked for point in members if point.relmse_masked is not None]
         if errors:
-            ms = round(mean(point.ms for point in many), 4)
-            made.append(Rung(peer, spp, len(many), ms, mean(errors), min(errors), max(errors), about=many[0].about))
-    return made
+            ms = round(mean(point.ms for point in members), 4)
+            about = members[0].about
+            rungs.append(Rung(peer, spp, len(members), ms, mean(errors), min(errors), max(errors), about))
+    return rungs
 
 
-def front(choices: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Of (time, error) those that nothing as fast or faster beats, by time: errors fall along it."""
-    kept: list[tuple[float, float]] = []
+def find_front(choices: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return the Pareto front of (time, error), by time: errors fall along it."""
+    front: list[tuple[float, float]] = []
     for ms, error in sorted(choices):
-        if not kept or error < kept[-1][1]:
-            kept.append((ms, error))
-    return kept
+        if not front or error < front[-1][1]:
+            front.append((ms, error))
+    return front
 
 
 def reach(name: str, choices: Iterable[tuple[float, float]], target: float) -> Reach:
-    """When `target` is reached along the front of at least one (time, error); straight between two of it in logs."""
-    line = front(choices)
+    """Find when the front of (time, error), at least one, reaches `target`: linear between two points in logarithms."""
+    line = find_front(choices)
     beyond, floor = line[-1]
     ms, at_most = None, line[0][1] <= target
     if at_most:
         ms = line[0][0]
     for (fast, worse), (slow, better) in pairwise(line):
         if better <= target < worse:
-            # An error of 0 has no logarithm, and then everything between the two is at it.
+            # An error of 0 has no logarithm; every target is reached at the slower point then.
             part = math.log(worse / target) / math.log(worse / better) if better > 0 else 1.0
             ms = fast * (slow / fast) ** part
     return Reach(name, ms, at_most, floor, beyond)
 
 
+def find_stateful(groups: Iterable[Group]) -> dict[str, int]:
+    """Return the graphs that take more than one frame to fill their state, and how many they take at most."""
+    fills: dict[str, int] = {}
+    for group in groups:
+        if group.frames_to_fill > 1:
+            fills[group.graph] = max(group.frames_to_fill, fills.get(group.graph, 1))
+    return fills
+
+
 def rows(
     groups: Sequence[Group], peers: Sequence[Rung], noise: float | None, targets: Sequence[float] = TARGETS
 ) -> list[Row]:
-    """The table, empty without peers. groups: with masked errors. noise: the reference's own relMSE."""
+    """Return the table, empty without peers. groups: with masked errors. noise: the reference's own relMSE."""
     ours: dict[str, list[tuple[float, float]]] = {}
+    stateful = find_stateful(groups)
     for group in groups:
+        if group.graph in stateful:
+            continue
         ours.setdefault(group.graph, []).append((group.frame_ms, group.relmse))
     theirs: dict[str, list[tuple[float, float]]] = {}
     for rung in peers:
@@ -131,14 +149,14 @@ def rows(
             target,
             _best([reach(graph, choices, target) for graph, choices in ours.items()]),
             {peer: reach(peer, choices, target) for peer, choices in theirs.items()},
-            noisy(noise, target),
+            is_noisy(noise, target),
         )
         for target in targets
     ]
 
 
-def _best(found: Sequence[Reach]) -> Reach | None:
-    """The fastest that reaches it, else the one with the lowest floor."""
-    if not found:
+def _best(reaches: Sequence[Reach]) -> Reach | None:
+    """Return the fastest that reaches the error, else the one with the lowest floor."""
+    if not reaches:
         return None
-    return min(found, key=lambda one: (one.ms is None, one.floor if one.ms is None else one.ms))
+    return min(reaches, key=lambda one: (one.ms is None, one.floor if one.ms is None else one.ms))

@@ -1,4 +1,4 @@
-"""Points of a sweep by graph and number of VPLs, the best of them, and what to take."""
+"""Points of a sweep grouped by graph and number of VPLs, the Pareto front, and a recommendation."""
 
 from __future__ import annotations
 
@@ -7,17 +7,20 @@ from dataclasses import dataclass, replace
 from statistics import mean
 
 from deferred_ir.profiling.sweep.points import Point
-from deferred_ir.profiling.sweep.reference import SHARE
+from deferred_ir.profiling.sweep.reference import MOST_NOISE
 
 BUDGET = 50.0
-"""Milliseconds for which the page gives advice."""
+"""Milliseconds a frame for which the report recommends settings."""
 SAME = 0.01
 """Relative difference of errors below which a slower choice is not on the Pareto front."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """All seeds of a graph and a number of VPLs: means, and the smallest and largest relMSE. Times in milliseconds."""
+    """All seeds of a graph and a number of VPLs: means, and the smallest and largest relMSE. Times in milliseconds.
+
+    frames_to_fill: frames before the measured ones in which the graph fills its state; 1 without state.
+    """
 
     graph: str
     vpls: int
@@ -27,51 +30,65 @@ class Group:
     relmse_low: float
     relmse_high: float
     flagged: bool
+    frames_to_fill: int = 1
     pareto: bool = False
 
 
-def flagged(point: Point) -> bool:
-    """The reference's own noise is too large beside this error, or unknown."""
-    return noisy(point.reference_noise, point.relmse)
+def is_flagged(point: Point) -> bool:
+    """Return whether the reference's own noise is unknown, or too large beside this point's error."""
+    return is_noisy(point.reference_noise, point.relmse)
 
 
-def noisy(noise: float | None, error: float) -> bool:
-    """Whether a reference of that `noise` (a relMSE, None if unknown) is no judge of such an `error`."""
-    return noise is None or noise > SHARE * error
+def is_noisy(noise: float | None, error: float) -> bool:
+    """Return whether a reference's noise (a relMSE, None if unknown) is too large to measure such an error."""
+    return noise is None or noise > MOST_NOISE * error
 
 
-def grouped(found: Iterable[Point], *, masked: bool = False) -> list[Group]:
-    """Points by graph and number of VPLs, those on the Pareto front marked.
+def group_points(points: Iterable[Point], *, masked: bool = False) -> list[Group]:
+    """Group points by graph and number of VPLs, and mark the groups on the Pareto front.
 
-    masked: with the errors of the pixels that have no edge inside; points without such pixels are left out.
+    masked: use the errors of the pixels without an edge inside; points without such pixels are left out.
     """
     seeds: dict[tuple[str, int], list[tuple[Point, float]]] = {}
-    for point in found:
+    for point in points:
         error = point.relmse_masked if masked else point.relmse
         if error is not None:
             seeds.setdefault((point.graph, point.key.vpls), []).append((point, error))
-    groups = []
-    for (graph, vpls), many in seeds.items():
-        errors = [error for _, error in many]
-        time = round(mean(point.frame_ms for point, _ in many), 4)
-        doubtful = any(noisy(point.reference_noise, error) for point, error in many)
-        groups.append(Group(graph, vpls, len(many), time, mean(errors), min(errors), max(errors), doubtful))
+    groups = [_make_group(graph, vpls, members) for (graph, vpls), members in seeds.items()]
     return [replace(group, pareto=not any(_beats(other, group) for other in groups)) for group in groups]
 
 
+def _make_group(graph: str, vpls: int, members: Sequence[tuple[Point, float]]) -> Group:
+    errors = [error for _, error in members]
+    return Group(
+        graph,
+        vpls,
+        seeds=len(members),
+        frame_ms=round(mean(point.frame_ms for point, _ in members), 4),
+        relmse=mean(errors),
+        relmse_low=min(errors),
+        relmse_high=max(errors),
+        flagged=any(is_noisy(point.reference_noise, error) for point, error in members),
+        frames_to_fill=max(point.frames_to_fill for point, _ in members),
+    )
+
+
 def _beats(other: Group, group: Group) -> bool:
-    """Faster and not worse, or as fast and better. Graphs of the same lights differ by roundings, which are no gain."""
+    """Return whether `other` is faster and not worse, or as fast and better.
+
+    Graphs of the same lights differ by rounding errors, which are no gain.
+    """
     if other.frame_ms == group.frame_ms:
         return other.relmse < group.relmse
     return other.frame_ms < group.frame_ms and other.relmse <= (1 + SAME) * group.relmse
 
 
 def advise(groups: Sequence[Group], budget: float = BUDGET) -> str:
-    """Which graph and how many VPLs to take for `budget` milliseconds, in a sentence."""
+    """Return a sentence that recommends a graph and a number of VPLs for `budget` milliseconds a frame."""
     within = [group for group in groups if group.frame_ms <= budget]
     if within:
         least = min(group.relmse for group in within)
-        # Of choices as good as each other, rounding aside, the fastest.
+        # The fastest of the choices that are as good as the best, rounding aside.
         best = min((g for g in within if g.relmse <= least * (1 + SAME)), key=lambda group: group.frame_ms)
         start = f"For {budget:g} ms: "
     else:

@@ -1,4 +1,4 @@
-"""The points of a sweep as files: one graph, one number of VPLs and one seed each, measured and held to a reference."""
+"""The points of a sweep as files: one graph, number of VPLs and seed each, compared with a reference."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from deferred_ir.report.left_out import LeftOut
 
 FOLDER = "points"
 PICTURES = (".png", ".error.png")
-"""What lies beside a point that has pictures: the image as the graph displays it, and its error in false colour."""
+"""Files beside a point with pictures: the image as the graph displays it, and its error in false colour."""
 
 
 @dataclass(frozen=True)
 class Key:
-    """What a point depends on. `scene_hash`, `graph_hash`: 16 hex digits; size: [width, height].
+    """Everything that a point depends on.
 
-    scene_hash: of the scene at the time of its image. motion: where something moves, the hash of the scene.
+    scene_hash: 16 hex digits, of the scene at the time of the image. graph_hash: 16 hex digits. size: [width, height].
+    motion: where something moves, the hash of the scene at all times.
     """
 
     scene_hash: str
@@ -44,11 +45,12 @@ class Key:
 class Point:
     """One measured point. Times in milliseconds, memory in bytes.
 
-    reference: hash of the reference image; reference_noise: its own relMSE, None where it is unknown. device:
-    GL_RENDERER; software: it is a driver without a GPU. frames: wall time of each recorded frame. laps: for each frame
-    (pass, GPU, CPU) in the order in which they ran. relmse_masked: of the pixels without an edge, None where there
-    is no such pixel. time: of the last frame, where something moves, seconds. pictures: the files of PICTURES lie
-    beside it.
+    reference: hash of the reference image. reference_noise: the reference's own relMSE, None if unknown. device:
+    GL_RENDERER. software: whether that is a driver without a GPU. frames_to_fill: frames until state between frames is
+    complete, before the measured frames; 1 for graphs without such state. frames: wall time of each measured frame.
+    laps: for each frame (pass, GPU, CPU) in the order in which the passes ran. relmse_masked: relMSE of the pixels
+    without an edge, None if there is no such pixel. time: of the last frame, where something moves, seconds. pictures:
+    whether the files of PICTURES lie beside the point.
     """
 
     key: Key
@@ -59,6 +61,7 @@ class Point:
     device: str
     software: bool
     vpls_alive: int
+    frames_to_fill: int
     frames: list[float]
     laps: list[list[tuple[str, float, float]]]
     memory: dict[str, int]
@@ -75,22 +78,22 @@ class Point:
 
     @property
     def frame_ms(self) -> float:
-        """Median wall time of a frame."""
+        """Median wall time of a frame, milliseconds."""
         return round(median(self.frames), 4)
 
 
 def path(folder: Path, name: str, suffix: str = ".json") -> Path:
-    """Where a file of the point `name` lies under the output folder."""
+    """Return the path of a file of the point `name` in the output folder."""
     return folder / FOLDER / f"{name}{suffix}"
 
 
 def save(folder: Path, point: Point) -> None:
-    """Write the point whole; its pictures have to be there by then."""
+    """Write the point. Its pictures have to be written before."""
     write_json(path(folder, point.key.name), asdict(point))
 
 
 def read(folder: Path, name: str) -> Point | None:
-    """The point `name`, None if it is missing, half-written, or not what its name says."""
+    """Read the point `name`. Returns None if it is missing, incomplete, or not what its name says."""
     try:
         data = json.loads(path(folder, name).read_text(encoding="utf-8"))
         laps = [[(str(label), float(gpu), float(cpu)) for label, gpu, cpu in frame] for frame in data["laps"]]
@@ -99,13 +102,13 @@ def read(folder: Path, name: str) -> Point | None:
             return None
         point = Point(**{**data, "key": Key(**data["key"]), "laps": laps, "left_out": left_out})
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
-        return None  # it is measured again
-    there = all(path(folder, name, suffix).is_file() for suffix in PICTURES)
-    return point if point.key.name == name and (there or not point.pictures) else None
+        return None  # the point is measured again
+    complete = not point.pictures or all(path(folder, name, suffix).is_file() for suffix in PICTURES)
+    return point if point.key.name == name and complete else None
 
 
 def make_folder(folder: Path) -> None:
-    """Create the output folder with room for points, or raise OutputError."""
+    """Create the output folder and its folder of points. Raises OutputError."""
     try:
         (folder / FOLDER).mkdir(parents=True, exist_ok=True)
         write_whole(folder / FOLDER / "probe", lambda part: part.touch())
@@ -115,11 +118,11 @@ def make_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: cannot be written: {why}; choose another folder") from error
 
 
-def ordered(points: Iterable[Point]) -> list[Point]:
-    """By graph, number of VPLs and seed."""
+def sort(points: Iterable[Point]) -> list[Point]:
+    """Sort points by graph, number of VPLs and seed."""
     return sorted(points, key=lambda point: (point.graph, point.key.vpls, point.key.seed))
 
 
-def renamed(point: Point, graph: str) -> Point:
-    """The point under the name that the caller has for its graph."""
+def rename(point: Point, graph: str) -> Point:
+    """Return the point with the caller's name for its graph."""
     return replace(point, graph=graph)

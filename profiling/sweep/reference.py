@@ -1,4 +1,4 @@
-"""The reference of a sweep: one that is given, or one traced until its noise is small beside the errors measured."""
+"""The reference of a sweep: a file, or one traced until its noise is small beside the errors measured."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from deferred_ir.truth.reference import reference
 
 FILE = "reference.npy"
 FIRST_SPP, MOST_SPP = 256, 4096
-SHARE = 0.1
-"""A reference's noise may be this much of an error that is held to it, else the row is flagged."""
+MOST_NOISE = 0.1
+"""Most noise of a reference as a fraction of an error measured with it; rows with more are flagged."""
 MARGIN = 1.5
-"""Errors of other seeds may be smaller than those that are looked at to choose the number of paths."""
+"""Safety factor: errors of other seeds may be smaller than those that decide the number of paths."""
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """radiance: (H, W, 3); record: what OUT.json says of it."""
+    """A reference image. radiance: (H, W, 3). record: the contents of its JSON file."""
 
     radiance: Array
     record: Mapping[str, Any]
@@ -47,13 +47,13 @@ class Truth:
 
     @property
     def noise(self) -> float | None:
-        """relMSE of its own noise; None where it is unknown."""
+        """relMSE of its own noise, None if unknown."""
         value = self.record.get("noise")
         return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 def read(path: Path, scene: Scene, size: tuple[int, int], time: float = 0.0) -> Truth:
-    """The reference at `path`, held by its record against scene, size and time; SettingError if they differ."""
+    """Read the reference at `path`. Raises SettingError if its scene, size or time differ from the sweep's."""
     radiance = read_radiance(path)
     height, width, _ = radiance.shape
     if (width, height) != size:
@@ -87,50 +87,50 @@ def load_or_trace(
     images: Callable[[], Sequence[Array]],
     bar: ProgressBar,
 ) -> Truth:
-    """The reference kept in `folder`, or a new one: paths are doubled until its noise is a tenth of the errors.
+    """Load the reference in `folder`, or trace one: paths are doubled until its noise is a tenth of the errors.
 
-    sweep: what decides how good it has to be; kept in the record, so that a sweep that goes on needs no second look.
-    images: renders the images whose error is likely to be the smallest. bar: shows how
-    far the paths are.
+    sweep: identifies the images that decide how good it has to be; it is saved with the reference, which is used as it
+    is if the next run names the same. images: renders those images, whose errors are likely to be the smallest. bar:
+    shows how far the paths are.
     """
     bounces = int(scene.render.set.get("vpl.bounces", 1))
-    truth = _kept(folder, scene, size, bounces)
+    truth = _load(folder, scene, size, bounces)
     if truth and truth.record.get("sweep") == sweep:
         return truth
     if truth is None:
-        truth = _traced(scene, size, FIRST_SPP, bounces, seed=0, bar=bar)
+        truth = _trace(scene, size, FIRST_SPP, bounces, seed=0, bar=bar)
         _save(folder, truth)
-    best = images()
+    probes = images()
     while True:
-        smallest = min(relmse(image, truth.radiance, truth.hit)[0] for image in best)
+        smallest = min(relmse(image, truth.radiance, truth.hit)[0] for image in probes)
         spp = int(truth.record["spp"])
-        if (truth.noise or 0.0) * MARGIN <= SHARE * smallest or 2 * spp > MOST_SPP:
+        if (truth.noise or 0.0) * MARGIN <= MOST_NOISE * smallest or 2 * spp > MOST_SPP:
             break
-        # As many paths again; all seeds before were smaller.
-        truth = _mean(truth, _traced(scene, size, spp, bounces, seed=spp, bar=bar))
+        # Double the paths. The seed is new: all seeds before were smaller.
+        truth = _mean(truth, _trace(scene, size, spp, bounces, seed=spp, bar=bar))
         _save(folder, truth)
     truth = Truth(truth.radiance, {**truth.record, "sweep": dict(sweep)})
     _save(folder, truth)
     return truth
 
 
-def _traced(scene: Scene, size: tuple[int, int], spp: int, bounces: int, *, seed: int, bar: ProgressBar) -> Truth:
+def _trace(scene: Scene, size: tuple[int, int], spp: int, bounces: int, *, seed: int, bar: ProgressBar) -> Truth:
     bar.label(f"reference, {spp} paths")
-    found = reference(scene, size, spp=spp, bounces=bounces, seed=seed, progress=bar.show)
-    return Truth(found.radiance, found.meta)
+    traced = reference(scene, size, spp=spp, bounces=bounces, seed=seed, progress=bar.show)
+    return Truth(traced.radiance, traced.meta)
 
 
 def _mean(first: Truth, second: Truth) -> Truth:
-    """The mean of two independent images of as many paths, whose variances add."""
+    """Return the mean of two independent images with the same number of paths; their variances add."""
     a, b = first.record, second.record
     radiance = (0.5 * (first.radiance.astype(np.float64) + second.radiance)).astype(np.float32)
-    told = {
+    summed = {
         "spp": a["spp"] + b["spp"],
         "standard_error": float(np.hypot(a["standard_error"], b["standard_error"]) / 2),
         "noise": (a["noise"] + b["noise"]) / 4,
         "seconds": a["seconds"] + b["seconds"],
     }
-    return Truth(radiance, {**a, **told})
+    return Truth(radiance, {**a, **summed})
 
 
 def _save(folder: Path, truth: Truth) -> None:
@@ -144,8 +144,8 @@ def _save(folder: Path, truth: Truth) -> None:
     write_whole(file, fill)
 
 
-def _kept(folder: Path, scene: Scene, size: tuple[int, int], bounces: int) -> Truth | None:
-    """What an earlier run left, if it is whole and of this scene, size and number of bounces."""
+def _load(folder: Path, scene: Scene, size: tuple[int, int], bounces: int) -> Truth | None:
+    """Load the reference of an earlier run. Returns None unless it is complete and of this scene, size and bounces."""
     file = folder / FILE
     try:
         radiance = read_radiance(file)

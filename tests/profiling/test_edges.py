@@ -22,7 +22,7 @@ ABOVE = Spotlight((0.0, 4.0, 0.0), (0.0, 0.0, 0.0), 100.0)
 
 
 def kept(scene, size=SIZE):
-    return edges.find(scene, size).kept
+    return edges.find(scene, size).counts
 
 
 def on_floor(camera, size):
@@ -135,7 +135,7 @@ def folder(tmp_path):
 
 def test_a_mask_comes_back_from_its_files(folder):
     mask = edges.read(folder, "a" * 16, SIZE)
-    assert mask.kept.shape == (30, 40)
+    assert mask.counts.shape == (30, 40)
     assert mask.left_out == pytest.approx(0.2, abs=0.05)
     assert {path.name for path in folder.iterdir()} == {"mask.npy", "mask.json", "mask.png"}
     assert edges.read(folder, "b" * 16, SIZE) is None

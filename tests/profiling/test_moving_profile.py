@@ -103,7 +103,7 @@ def test_a_sweep_moves_and_its_errors_are_of_the_last_frame(scene_file, swept):
     for graph, row in rows.items():
         with Renderer(SIZE, graph, "software") as renderer:
             plan = renderer.plan(scene, 12)
-            times = made.frames(plan)
+            times = made.frame_times(plan)
             assert np.diff(times) == pytest.approx(1 / FRAMES_PER_SECOND)
             assert times[-1] == 0.4
             for time in times:
@@ -134,7 +134,7 @@ def test_a_still_scene_is_settled_before_it_is_measured():
     made = sweep.Sweep(scene, SIZE, ["incremental", "deferred"], [64], 1, time=0.0)
     for graph, first in (("incremental", 8), ("deferred", 1)):
         with Renderer(SIZE, graph, "software") as renderer:
-            assert made.frames(renderer.plan(scene, 64)) == [0.0] * (first + sweep.FRAMES)
+            assert made.frame_times(renderer.plan(scene, 64)) == [0.0] * (first + sweep.FRAMES)
 
 
 # Notes

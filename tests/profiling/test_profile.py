@@ -14,7 +14,8 @@ import pytest
 
 from deferred_ir.cli.main import main
 
-sweep = import_module("deferred_ir.profiling.sweep.sweep")
+measure_point = import_module("deferred_ir.profiling.sweep.measure_point")
+sweep_points = import_module("deferred_ir.profiling.sweep.points")
 groups = import_module("deferred_ir.profiling.sweep.groups")
 sweep_reference = import_module("deferred_ir.profiling.sweep.reference")
 
@@ -46,13 +47,13 @@ def copied(whole, tmp_path):
 @pytest.fixture
 def measured(monkeypatch):
     """The (graph, VPLs, seed) of the points that are measured from here on."""
-    done, measure = [], sweep._measure
+    done, measure = [], measure_point.measure
 
-    def watched(*arguments, key, graph, **options):
+    def watched(setup, renderer, graph, key):
         done.append((graph, key.vpls, key.seed))
-        return measure(*arguments, key=key, graph=graph, **options)
+        return measure(setup, renderer, graph, key)
 
-    monkeypatch.setattr(sweep, "_measure", watched)
+    monkeypatch.setattr(measure_point, "measure", watched)
     return done
 
 
@@ -211,7 +212,7 @@ def test_ctrl_c_keeps_what_is_finished(whole, tmp_path, capsys, monkeypatch):
     (tmp_path / "points").mkdir()
     for name in ("reference.npy", "reference.json"):
         shutil.copy(whole / name, tmp_path)
-    done, measure = [], sweep._measure
+    done, measure = [], measure_point.measure
 
     def interrupted(*arguments, **options):
         if len(done) == 3:
@@ -220,7 +221,7 @@ def test_ctrl_c_keeps_what_is_finished(whole, tmp_path, capsys, monkeypatch):
         return done[-1]
 
     with monkeypatch.context() as patch:
-        patch.setattr(sweep, "_measure", interrupted)
+        patch.setattr(measure_point, "measure", interrupted)
         assert profile(tmp_path) == 130
     assert capsys.readouterr().err == "deferred-ir: interrupted\n"
     assert len(points(tmp_path)) == 3
@@ -253,7 +254,7 @@ def group(graph, vpls, frame_ms, relmse, flagged=False):
 
 
 def test_the_pareto_front_is_what_nothing_faster_reaches(whole):
-    first = sweep.points.read(whole, points(whole)[0].stem)
+    first = sweep_points.read(whole, points(whole)[0].stem)
     figures = {
         ("a", 4): (10, 0.1),
         ("a", 8): (20, 0.05),
@@ -265,7 +266,7 @@ def test_the_pareto_front_is_what_nothing_faster_reaches(whole):
         replace(first, key=replace(first.key, vpls=n), graph=graph, frames=[ms], relmse=error)
         for (graph, n), (ms, error) in figures.items()
     ]
-    on = {(group.graph, group.vpls) for group in groups.grouped(found) if group.pareto}
+    on = {(group.graph, group.vpls) for group in groups.group_points(found) if group.pareto}
     assert on == {("a", 4), ("a", 8), ("c", 4)}
 
 
@@ -341,7 +342,7 @@ def test_a_merge_of_unlike_sweeps_is_refused(what, whole, copied, tmp_path, caps
             path.unlink()
             data["key"]["size"] = [16, 16]
             data["pictures"] = False
-            name = sweep.Key(**data["key"]).name
+            name = sweep_points.Key(**data["key"]).name
             path.with_name(f"{name}.json").write_text(json.dumps(data))
         else:
             other(**{what: "another"})(path)

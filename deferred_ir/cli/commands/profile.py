@@ -21,8 +21,7 @@ from deferred_ir.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from deferred_ir.profiling.peers.points import Peers
-    from deferred_ir.profiling.sweep.points import Point
+    from deferred_ir.profiling.sweep.run import Results
 
 HELP = "Measure error against run time: graphs x numbers of VPLs x seeds."
 ORDER = 40
@@ -56,21 +55,22 @@ def run(arguments: argparse.Namespace) -> int:
 
     report.check_libraries()
     folder = Path(arguments.output)
-    points, peers = _merge(arguments, folder) if arguments.merge else _measure(arguments, folder)
-    print(report.write_all(folder, points, peers))
+    results = _merge(arguments, folder) if arguments.merge else _measure(arguments, folder)
+    print(report.write_all(folder, results))
     print(folder / "report.html", file=sys.stderr)
     return 0
 
 
-def _measure(arguments: argparse.Namespace, folder: Path) -> tuple[list[Point], Peers]:
-    """Run the sweep. Returns its points, and those of the peers."""
+def _measure(arguments: argparse.Namespace, folder: Path) -> Results:
+    """Run the sweep."""
     if arguments.scene is None:
         raise SettingError("profile: wants a SCENE to measure, or --merge DIR...")
     from deferred_ir.engine.settings import choose_size, list_notes
     from deferred_ir.graph.file import graph_names
     from deferred_ir.loading.load import load
     from deferred_ir.profiling.peers import ladder
-    from deferred_ir.profiling.sweep import sweep
+    from deferred_ir.profiling.sweep.run import run as run_sweep
+    from deferred_ir.profiling.sweep.sweep import Sweep
 
     counts = _parse_vpls(VPLS if arguments.vpls is None else arguments.vpls)
     shard = _parse_shard(arguments.shard)
@@ -80,12 +80,12 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> tuple[list[Point], 
     size = choose_size(arguments.size, scene.render)
     seeds = SEEDS if arguments.seeds is None else arguments.seeds
     time = LAST if arguments.time is None else arguments.time
-    what = sweep.Sweep(scene, size, graphs, counts, seeds, arguments.device, shard, peers, time if scene.moves else 0.0)
+    what = Sweep(scene, size, graphs, counts, seeds, arguments.device, shard, peers, time if scene.moves else 0.0)
     print_notes(list_notes(scene))
-    return sweep.run(what, folder, Path(arguments.reference) if arguments.reference else None)
+    return run_sweep(what, folder, Path(arguments.reference) if arguments.reference else None)
 
 
-def _merge(arguments: argparse.Namespace, folder: Path) -> tuple[list[Point], Peers]:
+def _merge(arguments: argparse.Namespace, folder: Path) -> Results:
     """Join the points of the shards that --merge names."""
     without = ("graphs", "vpls", "seeds", "size", "reference", "shard", "peers", "time", "scene")
     extra = [name for name in without if getattr(arguments, name) is not None]
@@ -97,10 +97,10 @@ def _merge(arguments: argparse.Namespace, folder: Path) -> tuple[list[Point], Pe
             raise OutputError(f"{name}: is no folder; --merge joins folders that profile wrote")
     from deferred_ir.profiling.sweep import shards
 
-    points, peers, broken = shards.merge([Path(name) for name in arguments.merge], folder)
+    results, broken = shards.merge([Path(name) for name in arguments.merge], folder)
     if broken:
         print_notes([f"{broken} points were unusable and left out; run their shard again"])
-    return points, peers
+    return results
 
 
 def _parse_vpls(text: str) -> list[int]:

@@ -17,7 +17,7 @@ WINDOW = 1280, 720
 
 
 def main(target: str, scale: str = "1") -> int:
-    """The Cornell box with local frames and the shadow map, by the keys that a user would press."""
+    """Draw the Cornell box with axes of its lights and the shadow map, by the keys that a user would press."""
     from deferred_ir.gl.window import Window
     from deferred_ir.loading.load import load
     from deferred_ir.output.image import Image

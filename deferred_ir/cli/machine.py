@@ -246,9 +246,9 @@ def _check_display() -> Check:
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         return Check(name, False, "none; only the viewer needs one", "set DISPLAY, or use xvfb-run", optional=True)
     try:
-        from deferred_ir.gl.window import display_opens
+        from deferred_ir.gl.window import can_open_display
 
-        opens = display_opens()
+        opens = can_open_display()
     except ImportError as error:
         return Check(name, False, str(error), "pip install glfw", optional=True)
     if not opens:

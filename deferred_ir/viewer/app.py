@@ -11,6 +11,7 @@ from deferred_ir.output.image import Image
 from deferred_ir.viewer.canvas import Area, Canvas
 from deferred_ir.viewer.controls import Controls
 from deferred_ir.viewer.file_watch import FileWatch, is_graph
+from deferred_ir.viewer.panels.gui import Gui
 from deferred_ir.viewer.panels.side_panel import Panel
 from deferred_ir.viewer.session import Session
 
@@ -23,6 +24,8 @@ class Viewer:
 
     def __init__(self, window: Window, session: Session) -> None:
         self.window, self.session = window, session
+        with window:
+            self._gui = Gui(window)
         self.canvas = Canvas(window, session.renderer.gpu, session.renderer.executor.library)
         self.controls = Controls(window, session)
         self.panel = Panel(window, session, self.controls)
@@ -46,7 +49,8 @@ class Viewer:
     def frame(self, wait: float = 0.0) -> bool:
         """Do one round. Returns whether the picture has changed. The frame is drawn but not yet on screen."""
         with self.window:
-            self.window.begin(wait)
+            self.window.take_events(wait)
+            self._gui.begin()
             self.controls.take()
             self.panel.draw(self.area())
             self._reload()
@@ -55,10 +59,10 @@ class Viewer:
                 area = self.area()
                 self.session.resize((area.width, area.height))
                 changed = self.session.draw()
-                self.window.target()
+                self.window.clear()
                 self._show_picture(area)
                 self.panel.finish()
-            self.window.end()
+            self._gui.end()
             self.frames += 1
         return changed
 
@@ -98,4 +102,5 @@ class Viewer:
         with self.window:
             self.panel.close()
             self.session.close()
+            self._gui.close()
         self.window.close()

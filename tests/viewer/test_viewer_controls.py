@@ -15,7 +15,7 @@ from deferred_ir.loading.load import load
 from deferred_ir.output.exposure import automatic_stops
 from deferred_ir.scene.lights.spot import LIGHT
 from deferred_ir.viewer import saving
-from deferred_ir.viewer.panels import light_frames as local_frames
+from deferred_ir.viewer.panels import light_axes
 from deferred_ir.viewer.panels import side_panel as panels
 from deferred_ir.viewer.tone_map import tone_map
 
@@ -99,15 +99,15 @@ def test_the_light_is_put_at_the_camera_and_seen_from(viewer):
     assert np.array_equal(picture(viewer), rendered(shown, set=FEW))
 
 
-def test_local_frames_are_drawn_where_the_lights_are(viewer):
+def test_axes_are_drawn_where_the_lights_are(viewer):
     before = picture(viewer).astype(int)
     act(viewer, "key", "f")
-    records = local_frames.records(viewer.session)
+    records = light_axes.find_lights(viewer.session)
     assert records.dtype == LIGHT
     blue = picture(viewer).astype(int) - before
     drawn = (blue != 0).any(axis=-1)
     assert drawn.any()
-    points, front = local_frames.project(records["position"].astype(float), viewer.session)
+    points, front = light_axes.project(records["position"].astype(float), viewer.session)
     inside = front & (points > 1).all(axis=1) & (points < np.array(SIZE) - 2).all(axis=1)
     assert inside.sum() >= 4
     for x, y in points[inside].astype(int):
@@ -116,7 +116,7 @@ def test_local_frames_are_drawn_where_the_lights_are(viewer):
 
 def test_a_projected_point_is_where_the_ray_of_its_pixel_goes(viewer):
     rays = viewer.session.eye.rays(viewer.session.size)
-    points, front = local_frames.project(np.asarray(viewer.session.eye.position) + rays[7, 11][None], viewer.session)
+    points, front = light_axes.project(np.asarray(viewer.session.eye.position) + rays[7, 11][None], viewer.session)
     assert front.all()
     assert np.allclose(points, [[11.5, 7.5]])
 

@@ -17,7 +17,7 @@ from deferred_ir.graph.file import graph_hash, load_graph
 from deferred_ir.loading.load import load
 from deferred_ir.viewer.panels import reference
 from deferred_ir.viewer.panels import side_panel as panels
-from deferred_ir.viewer.panels.light_frames import records
+from deferred_ir.viewer.panels.light_axes import find_lights
 from deferred_ir.viewer.panels.side_panel import WIDTH
 
 PARTS = ("Scene", "Light", "Passes", "Parameters", "Reference", "Shadow map", "Save", "Keys")
@@ -102,7 +102,7 @@ def test_the_map_of_any_light_stands_in_the_corner(viewer, graph, settings):
     viewer.controls.switches["map"] = True
     maps, edge = viewer.panel.maps, round(0.33 * SIZE[1])
     viewer.frame()
-    lights = records(viewer.session)
+    lights = find_lights(viewer.session)
     tiles = sorted(lights["tile"][shining(lights)].astype(int).tolist())
     assert len(tiles) > 4
     for maps.light, maps.linear in product((0, 2, len(tiles) - 1), (True, False)):

@@ -8,17 +8,18 @@ from pathlib import Path
 import numpy as np
 
 from deferred_ir.base.errors import Error
+from deferred_ir.frame.vpl_params import VPLS_ALIVE
 from deferred_ir.gl.window import Window
 from deferred_ir.graph.file import graph_names
 from deferred_ir.graph.params import specs
 from deferred_ir.loading.load import builtin_scenes
 from deferred_ir.viewer.canvas import Area, Canvas
 from deferred_ir.viewer.controls import KEYS, Controls
-from deferred_ir.viewer.panels import light_frames
-from deferred_ir.viewer.panels.parameters import widget
+from deferred_ir.viewer.panels import light_axes
+from deferred_ir.viewer.panels.parameters import draw_widget
 from deferred_ir.viewer.panels.passes import PassesPanel
 from deferred_ir.viewer.panels.reference import ReferencePanel
-from deferred_ir.viewer.panels.shadow_maps import MapsPanel
+from deferred_ir.viewer.panels.shadow_maps import ShadowMapsPanel
 from deferred_ir.viewer.saving import save
 from deferred_ir.viewer.session import Session
 
@@ -38,7 +39,7 @@ class Panel:
         self._imgui, self._implot = imgui, implot
         self._window, self._session, self._controls = window, session, controls
         self.passes = PassesPanel(imgui, session)
-        self.maps = MapsPanel(imgui, session, controls)
+        self.maps = ShadowMapsPanel(imgui, session, controls)
         self.reference = ReferencePanel(imgui, session)
         self.saved = ""
         self._scenes = [name for name, _ in builtin_scenes()]
@@ -60,7 +61,7 @@ class Panel:
         """Draw all controls of this frame, and the axes of the lights over the picture in `area`."""
         imgui, (width, height) = self._imgui, self._window.size
         if self._controls.switches["frames"]:
-            light_frames.draw(imgui, self._session, area, height, self.maps.edge(area))
+            light_axes.draw_axes(imgui, self._session, area, height, self.maps.edge(area))
         if self.width == 0 or height == 0:
             return
         imgui.set_next_window_pos(imgui.ImVec2(width - self.width, 0))
@@ -90,7 +91,7 @@ class Panel:
         imgui, session = self._imgui, self._session
         times = np.array(session.frame_ms, dtype=np.float64)
         last = f"{times[-1]:.1f} ms" if len(times) else "no frame yet"
-        alive = session.counters.get("vpls_alive")
+        alive = session.counters.get(VPLS_ALIVE.name)
         lights = "" if alive is None else f", {alive} VPLs"
         imgui.text(f"{session.scene.name}, {session.size[0]}x{session.size[1]}{lights}, {last}")
         if session.accumulation:
@@ -169,7 +170,7 @@ class Panel:
             imgui.separator_text(node.name if node.name in running else f"{node.name} (left out)")
             imgui.push_id(node.name)
             for name, spec in known.items():
-                new = widget(imgui, name, spec, getattr(node.work.params, name))
+                new = draw_widget(imgui, name, spec, getattr(node.work.params, name))
                 if new is not None:
                     session.adjust(f"{node.name}.{name}", new)
             imgui.pop_id()

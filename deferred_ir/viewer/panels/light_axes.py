@@ -1,4 +1,4 @@
-"""Light and VPLs drawn as local frames: x red, y green, z, where it shines, blue. What a surface hides is dim."""
+"""Draws light and VPLs as their axes: x red, y green, z, where they shine, blue. Lights behind surfaces are dim."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ from deferred_ir.viewer.canvas import Area
 from deferred_ir.viewer.session import Session
 
 LENGTH = 0.02
-"""Of an axis, diagonals of the scene; the spotlight's are three times as long."""
+"""Of a VPL's axis, diagonals of the scene; the spotlight's are three times as long."""
 COLORS = ((1.0, 0.25, 0.2), (0.3, 0.9, 0.3), (0.3, 0.5, 1.0))
 DIM = 0.25
 
 
-def records(session: Session) -> np.ndarray | None:
-    """The LIGHT records of the last frame, from whichever step writes them."""
+def find_lights(session: Session) -> np.ndarray | None:
+    """Return the LIGHT records of the last frame, from whichever step writes them; None if none does."""
     for step in session.plan.steps:
         for port, output in step.outputs.items():
-            found = session.output((step.name, port)) if getattr(output.description, "format", "") == "light" else None
-            if isinstance(found, GpuBuffer) and found.records.dtype == LIGHT:
-                return found.records
+            is_light = getattr(output.description, "format", "") == "light"
+            buffer = session.output((step.name, port)) if is_light else None
+            if isinstance(buffer, GpuBuffer) and buffer.records.dtype == LIGHT:
+                return buffer.records
     return None
 
 
 def project(points: Array, session: Session) -> tuple[Array, Bools]:
-    """Pixels (n, 2) of the picture, y down, for points (n, 3), and which lie before the eye, bool (n,)."""
+    """Project world points (n, 3). Returns pixels (n, 2) of the picture, y down, and which lie before the eye, (n,)."""
     eye, (width, height) = session.eye, session.size
     a, b, c = eye.ray_axes((width, height))
     d = points - np.asarray(eye.position)
@@ -40,9 +41,9 @@ def project(points: Array, session: Session) -> tuple[Array, Bools]:
     return np.stack([(x + 1) / 2 * width, (1 - y) / 2 * height], axis=-1), front
 
 
-def draw(imgui: Any, session: Session, area: Area, window_height: int, covered: int = 0) -> None:
-    """Draw all frames over the picture in `area`, but over a square of `covered` pixels in its lower left corner."""
-    lights = records(session)
+def draw_axes(imgui: Any, session: Session, area: Area, window_height: int, covered: int = 0) -> None:
+    """Draw all lights over the picture in `area`, except over a square of `covered` pixels in its lower left corner."""
+    lights = find_lights(session)
     if lights is None:
         return
     origin, centre = lights["position"].astype(float), session.scene.geometry.centre

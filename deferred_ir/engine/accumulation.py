@@ -7,7 +7,8 @@ mean: so display pixels come from the graph's own tone map, of the mean, not fro
 from __future__ import annotations
 
 import time as clock
-from typing import TYPE_CHECKING, Any
+from collections.abc import Container
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,11 +19,36 @@ from deferred_ir.output.image import Image
 from deferred_ir.sampling.streams import frame_seed
 from deferred_ir.scene.scene import Scene
 
-if TYPE_CHECKING:
-    from deferred_ir.engine.renderer import Renderer
-
 LAP = "accumulate"
-"""What the time is called that adding up takes."""
+"""Name of the time that adding up takes, among those of passes."""
+
+
+class FrameSource(Protocol):
+    """Draws frames and gives access to what their passes wrote: a Renderer, in general."""
+
+    def draw(
+        self,
+        scene: Scene,
+        plan: Plan,
+        *,
+        seed: int = ...,
+        time: float = ...,
+        measurement: Measurement | None = ...,
+        steps: Container[str] | None = ...,
+    ) -> None:
+        """Draw one frame, or of its passes only those named in `steps`."""
+
+    def finish(self, measurement: Measurement) -> None:
+        """Add the times that are still in flight to `measurement`."""
+
+    def read(self, plan: Plan) -> Image:
+        """Read the image that the last frame left."""
+
+    def read_texture(self, source: tuple[str, str]) -> Any:
+        """Return what the output `source` holds."""
+
+    def write_texture(self, source: tuple[str, str], pixels: Any) -> None:
+        """Write `pixels` into the output `source`."""
 
 
 class Accumulation:
@@ -35,7 +61,7 @@ class Accumulation:
 
     def __init__(
         self,
-        renderer: Renderer,
+        renderer: FrameSource,
         scene: Scene,
         plan: Plan,
         *,
@@ -43,15 +69,14 @@ class Accumulation:
         time: float = 0.0,
         measurement: Measurement | None = None,
     ) -> None:
-        origin = renderer.graph().origin
         if "radiance" not in plan.outputs:
-            raise GraphError(f"{origin}: has no output 'radiance', which is what frames are averaged in; add it")
+            raise GraphError(f"{plan.origin}: has no output 'radiance', which is what frames are averaged in; add it")
         self._source = plan.outputs["radiance"]
         self.follow(plan)
         if plan.outputs.get("display", self._source)[0] in self._early - {self._source[0]}:
             raise GraphError(
-                f"{origin}: outputs.display: is not made of outputs.radiance, so it cannot show the mean of frames; "
-                "ask for .npy or .exr only, or for one frame"
+                f"{plan.origin}: outputs.display: is not made of outputs.radiance, so it cannot show the mean of "
+                "frames; ask for .npy or .exr only, or for one frame"
             )
         self._renderer, self._scene, self._seed, self._time = renderer, scene, seed, time
         self._measurement, self._parts = measurement, Measurement() if measurement else None
@@ -60,12 +85,12 @@ class Accumulation:
 
     def follow(self, plan: Plan) -> None:
         """Go on with `plan`, which differs from the one before only in what reads the mean."""
-        self._plan, self._late = plan, readers(plan, self._source)
+        self._plan, self._late = plan, find_readers(plan, self._source)
         self._early = {step.name for step in plan.steps} - self._late
 
     @property
     def frames(self) -> int:
-        """How many frames the mean is of."""
+        """How many frames are in the mean."""
         return self._sum[0]
 
     @property
@@ -74,25 +99,23 @@ class Accumulation:
         return self._sum[1]
 
     def draw(self) -> None:
-        """Draw the next frame and add it. One that is broken off, by Ctrl-C say, has never been."""
+        """Draw the next frame and add it. A frame that is interrupted, for example by Ctrl-C, does not count."""
         done, total = self._sum
         self._run(frame_seed(self._seed, done), self._early)
         start = clock.perf_counter()
-        with self._renderer.gpu.ctx:
-            pixels = self._renderer.executor.resource(self._source).read()
+        pixels = self._renderer.read_texture(self._source)
         self._sum = done + 1, total + pixels.astype(np.float64)  # at once, whenever an interrupt comes
         self._adding_ms += (clock.perf_counter() - start) * 1e3
 
     def image(self) -> Image:
-        """The mean of the frames so far, one at least."""
+        """Return the mean of the frames so far, at least one."""
         self.show()
         return self._renderer.read(self._plan)
 
     def show(self) -> None:
-        """Put the mean in the place of radiance, and run what reads it."""
+        """Write the mean in the place of radiance, and run what reads it."""
         done, total = self._sum
-        with self._renderer.gpu.ctx:
-            self._renderer.executor.resource(self._source).upload(total / done)
+        self._renderer.write_texture(self._source, total / done)
         self._run(self._seed, self._late)
         if self._measurement and self._parts:
             self._renderer.finish(self._parts)
@@ -107,8 +130,8 @@ class Accumulation:
         self._renderer.draw(self._scene, self._plan, seed=seed, time=self._time, measurement=self._parts, steps=steps)
 
 
-def readers(plan: Plan, source: tuple[str, str]) -> set[str]:
-    """Names of the steps that read what `source` (pass, port) wrote, themselves or through others."""
+def find_readers(plan: Plan, source: tuple[str, str]) -> set[str]:
+    """Return the names of the steps that read what `source` (pass, port) wrote, themselves or through others."""
     found: set[str] = set()
     for step in plan.steps:
         if any(wire and (wire == source or wire[0] in found) for wire in step.sources.values()):

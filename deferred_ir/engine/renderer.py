@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from contextlib import nullcontext
 from numbers import Integral
 from pathlib import Path
@@ -16,14 +16,13 @@ from deferred_ir.base.errors import GraphError, SettingError
 from deferred_ir.engine.accumulation import Accumulation
 from deferred_ir.engine.executor import Executor
 from deferred_ir.engine.measurement import Measurement
-from deferred_ir.engine.settings import set_vpls
+from deferred_ir.engine.setup import Setup
 from deferred_ir.frame.facts import collect_facts
 from deferred_ir.frame.frame import PARTS, Frame
 from deferred_ir.frame.scene_buffers import SceneBuffers
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.devices import Loader
 from deferred_ir.gl.timers import Timers
-from deferred_ir.graph import file
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.graph import Graph, Plan
 from deferred_ir.graph.pass_base import Pass
@@ -63,11 +62,8 @@ class Renderer:
     ) -> None:
         if not isinstance(size, Sequence) or len(size) != 2 or not all(isinstance(n, Integral) and n > 0 for n in size):
             raise SettingError(f"size {size!r}: wants two whole numbers above 0, width and height")
-        self.size, self.reuse = (int(size[0]), int(size[1])), reuse
-        self._graph_name, self._set, self._passes = graph, dict(set or {}), dict(passes or {})
-        self._keep_all = keep_all
-        self._graphs: dict[int | None, Graph] = {}
-        self._plans: dict[Any, Plan] = {}
+        self.reuse, self._keep_all = reuse, keep_all
+        self.setup = Setup((int(size[0]), int(size[1])), graph, dict(set or {}), dict(passes or {}))
         self.graph()  # a fault in the graph shows before a context is made
         self.gpu = Gpu(device, window)
         if max(size) > self.gpu.max_size:
@@ -86,31 +82,23 @@ class Renderer:
         size: tuple[int, int] | None = None,
         graph: str | Path | None = None,
         set: Mapping[str, Any] | None = None,
-    ) -> Callable[[], None]:
+    ) -> None:
         """Change what is named; the rest stays, and so do programs, textures and the scene that are still needed.
 
-        With `graph` or `set` files are read again. After a GraphError nothing has changed. What is returned takes the
-        change back.
+        With `graph` or `set` files are read again. After a GraphError nothing has changed. To take a change back,
+        assign the `setup` of before.
         """
-        names = ("size", "_graph_name", "_set", "_graphs", "_plans")
-        before = {name: getattr(self, name) for name in names}
-        name = self._graph_name if graph is None else graph
-        settings = self._set if set is None else dict(set)
-        own = self.graph()
-        if graph is not None or set is not None:
-            own = file.load_graph(name, settings, self._passes)
-        if size is not None:
-            self.size = size
-        self._graph_name, self._set = name, settings
-        self._graphs, self._plans = {None: own}, {}
-        return lambda: self.__dict__.update(before)
+        setup = self.setup if graph is None and set is None else self.setup.reload(graph, set)
+        self.setup = setup if size is None else setup.resize(size)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the image in pixels."""
+        return self.setup.size
 
     def graph(self, vpls: int | None = None) -> Graph:
-        """The graph with this number of VPLs, None for its own."""
-        if vpls not in self._graphs:
-            count = {} if vpls is None else set_vpls(self.graph(), vpls)
-            self._graphs[vpls] = file.load_graph(self._graph_name, self._set | count, self._passes)
-        return self._graphs[vpls]
+        """Return the graph with this number of VPLs, None for its own."""
+        return self.setup.graph(vpls)
 
     def plan(
         self,
@@ -120,9 +108,9 @@ class Renderer:
         *,
         keep_all: bool | None = None,
     ) -> Plan:
-        """What a frame of `scene` runs; `outputs` are all that the graph has unless some are named.
+        """Return what a frame of `scene` runs to write `outputs`, all that the graph has unless some are named.
 
-        keep_all: with or without what the scene does not need; None: as the Renderer was made.
+        keep_all: whether to run what the scene does not need; None: as the Renderer was made.
         """
         if not isinstance(scene, Scene):
             raise SettingError(f"scene: is {type(scene).__name__}, not a Scene; load it first: deferred_ir.load(...)")
@@ -131,16 +119,16 @@ class Renderer:
         keep_all = self._keep_all if keep_all is None else keep_all
         wanted = tuple(graph.outputs if outputs is None else outputs)
         key = (vpls, facts, keep_all, wanted)
-        if key not in self._plans:
+        if key not in self.setup.plans:
             plan = compile(graph, wanted, facts, keep_all=keep_all, parts=PARTS)
             _check_images(graph, plan)
-            self._plans[key] = plan
-        return self._plans[key]
+            self.setup.plans[key] = plan
+        return self.setup.plans[key]
 
     def render(
         self, scene: Scene, *, vpls: int | None = None, seed: int = 0, time: float = 0.0, accumulate: int = 1
     ) -> Image:
-        """One image of `scene` at `time` seconds with `vpls` VPLs (None: as many as the graph says).
+        """Render one image of `scene` at `time` seconds with `vpls` VPLs (None: as many as the graph says).
 
         accumulate: frames with fresh samples that are averaged in it; `Accumulation` adds them up one by one.
         """
@@ -201,21 +189,26 @@ class Renderer:
             measurement.laps += self._timers.collect(wait=True)
 
     def read(self, plan: Plan) -> Image:
-        """The image that the last `draw` of `plan` made."""
-        with self.gpu.ctx:
-            arrays = {
-                name: self.executor.resource(source).read()[::-1]
-                for name, source in plan.outputs.items()
-                if name in IMAGES
-            }
+        """Read the image that the last `draw` of `plan` made."""
+        arrays = {name: self.read_texture(s)[::-1] for name, s in plan.outputs.items() if name in IMAGES}
         radiance, display = arrays.get("radiance"), arrays.get("display")
         return Image(
             None if radiance is None else np.ascontiguousarray(radiance[..., :3]),
             None if display is None else np.ascontiguousarray(display[..., :3]),
         )
 
+    def read_texture(self, source: tuple[str, str]) -> Any:
+        """Return what the output `source`, (pass, port), holds: an array (H, W, channels), bottom row first."""
+        with self.gpu.ctx:
+            return self.executor.resource(source).read()
+
+    def write_texture(self, source: tuple[str, str], pixels: Any) -> None:
+        """Write `pixels` (H, W, channels), bottom row first, into the output `source`, (pass, port)."""
+        with self.gpu.ctx:
+            self.executor.resource(source).upload(pixels)
+
     def memory(self) -> dict[str, int]:
-        """Bytes of textures and buffers on the device, the scene's included."""
+        """Return the bytes of textures and buffers on the device, the scene's included."""
         memory = self.executor.memory()
         if self._buffers:
             memory["textures"] += self._buffers.texture_bytes

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from deferred_ir.base.errors import Error, GraphError
-from deferred_ir.engine.accumulation import Accumulation, readers
+from deferred_ir.engine.accumulation import Accumulation, find_readers
 from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import IMAGES, Renderer
 from deferred_ir.engine.settings import DEFAULT_GRAPH, choose_settings
@@ -157,16 +157,17 @@ class Session:
     def _configure(self, graph: str, settings: dict[str, Any], scene: Scene) -> None:
         """Plan with another graph or other settings. Raises Error, and changes nothing then."""
         before = self.graph, self.settings, self.plan
-        undo = self.renderer.configure(graph=graph, set=settings)
+        setup = self.renderer.setup
 
         def restore() -> None:
-            undo()
+            self.renderer.setup = setup
             self.graph, self.settings, self.plan = before
 
+        self.renderer.configure(graph=graph, set=settings)
         try:
             self.plan = self._make_plan(scene)
         except Error:
-            undo()
+            self.renderer.setup = setup
             raise
         self.graph, self.settings, self.error, self._undo = graph, settings, "", restore
 
@@ -244,7 +245,7 @@ class Session:
 
     def _keeps_mean(self, before: Plan) -> bool:
         """Return whether the plan differs from `before` only in passes that read the mean."""
-        return find_changed(before, self.plan) <= readers(self.plan, self.plan.outputs["radiance"])
+        return find_changed(before, self.plan) <= find_readers(self.plan, self.plan.outputs["radiance"])
 
     def _draw_frame(self) -> bool:
         """Draw a frame. Returns whether any pass had to run."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from deferred_ir.engine.accumulation import readers
+from deferred_ir.engine.accumulation import find_readers
 from deferred_ir.graph.graph import Plan, Step
 from deferred_ir.graph.roles import find_parameter
 from deferred_ir.output.exposure import automatic_stops
@@ -29,7 +29,7 @@ def tone_map(session: Session, radiance: Any, stops: float | None) -> np.ndarray
     """
     plan = session.plan if stops is None else _set_exposure(session.plan, stops)
     source = plan.outputs["radiance"]
-    late = readers(plan, source)
+    late = find_readers(plan, source)
     texture = session.output(source)
     pixels = np.ones((*radiance.shape[:2], 4), np.float32)
     pixels[..., :3] = radiance[::-1]

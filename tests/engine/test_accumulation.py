@@ -16,7 +16,7 @@ from small_scenes import room
 
 from deferred_ir.base.errors import GraphError, SettingError
 from deferred_ir.cli.main import main
-from deferred_ir.engine.accumulation import Accumulation, readers
+from deferred_ir.engine.accumulation import Accumulation, find_readers
 from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.graph.compile import compile
@@ -153,9 +153,9 @@ def test_readers_are_all_that_a_resource_reaches():
         ),
         ["image"],
     )
-    assert readers(plan, ("a", "out")) == {"b", "last"}
-    assert readers(plan, ("a", "other")) == {"c", "last"}
-    assert readers(plan, ("last", "out")) == set()
+    assert find_readers(plan, ("a", "out")) == {"b", "last"}
+    assert find_readers(plan, ("a", "other")) == {"c", "last"}
+    assert find_readers(plan, ("last", "out")) == set()
 
 
 def test_pixels_that_are_not_made_of_radiance_are_refused(tmp_path, renderer):

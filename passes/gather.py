@@ -18,7 +18,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Ints
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_culling import last_shining
+from deferred_ir.frame.light_culling import count_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
@@ -93,7 +93,7 @@ class Gather(Pass):
         drawn = io["depth"].version, io["normals"].version
         windows = (*drawn, shares, self.params, side) if frame.reuse else None
         known = windows is not None and io.state.windows == windows
-        defines = shader_variants.of_pixels(frame, vpls.records)
+        defines = shader_variants.choose_for_pixels(frame, vpls.records)
         kept = {"SMOOTH": defines["SMOOTH"], "KEEP": int(frame.reuse), "KNOWN": int(known)}
         program = io.program("gather.frag", defines=kept)
         program.set(
@@ -117,16 +117,16 @@ class Gather(Pass):
             if not ranges.any():
                 continue
             gpu.barrier()
-            vpls.bind_uniform(1, start // block)
+            vpls.bind(start // block)
             program.set(ranges=ranges.tolist())
             program.draw_fullscreen()
         gpu.barrier()
 
 
 def _ranges(vpls: np.ndarray, shares: int, start: int, stop: int) -> Ints:
-    """Where in the block from `start` to `stop` of VPLs, LIGHT records (n,), each share begins and ends, int (s, 2)."""
+    """Where in the block from `start` to `stop` of VPLs, VPL records (n,), each share begins and ends, int (s, 2)."""
     starts = np.clip(find_share_starts(len(vpls), round(shares**0.5)), start, stop)
-    ends = [first + last_shining(vpls[first:end]) for first, end in itertools.pairwise(starts)]
+    ends = [first + count_shining(vpls[first:end]) for first, end in itertools.pairwise(starts)]
     ranges: Ints = np.column_stack([starts[:-1], ends]) - start
     return np.where((ranges[:, 1] > ranges[:, 0])[:, None], ranges, 0)
 

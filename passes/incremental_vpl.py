@@ -1,4 +1,4 @@
-"""VPLs that outlive their frame (Laine et al. 2007): -> lights, as the pass vpl writes them, and which of them are new.
+"""VPLs that outlive their frame (Laine et al. 2007): -> vpls, as the pass vpl writes them, and which of them are new.
 
 A few VPLs are new in each frame, the others stay where they are and keep their tile of the atlas, so that only the new
 ones need a map. They end where scene, seed or parameters are others, or the spotlight is turned off.
@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_buffer import output, packed
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_buffer import describe_output, pack_vpls
 from deferred_ir.frame.vpl_params import VPLS_ALIVE, VplParams
 from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.figures import Figure
@@ -51,11 +49,11 @@ class IncrementalVpl(Pass):
     State = State
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """One buffer with room for the spotlight and a VPL for each ray."""
+        """One buffer with room for a VPL for each ray."""
         del inputs
         if self.params.least > self.params.most:
             raise GraphError(f"least {self.params.least}: is more than most, {self.params.most}; give both")
-        return {"lights": output(self.params.count)}
+        return {"vpls": describe_output(self.params)}
 
     def state_facts(self, facts: Facts) -> Statements:
         """State whether there may be VPLs, and whether they are clamped."""
@@ -83,10 +81,10 @@ class IncrementalVpl(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Go on from what the last frame left, pack, upload."""
-        light, p, lights, state = frame.scene.spotlight, self.params, io["lights"], io.state
+        light, p, state = frame.scene.spotlight, self.params, io.state
         if p.count == 0 or not any(light.emission):
             state.vpls = None
-            lights.write(packed(frame.scene, NONE, p, NONE.ray))
+            io["vpls"].write(pack_vpls(frame.scene, NONE, p, NONE.ray))
             return
         key = p, frame.seed
         all_vpls = state.vpls if state.vpls and state.key == key else IncrementalVpls(p.count, frame.seed)
@@ -95,8 +93,7 @@ class IncrementalVpl(Pass):
         state.key, state.vpls = key, all_vpls
         if not all_vpls.at_rest:
             io.repeat()
-        versions = np.append(all_vpls.find_spot_version(light), all_vpls.version[vpls.ray])
-        lights.write(packed(frame.scene, vpls, p, vpls.ray), versions)
+        io["vpls"].write(pack_vpls(frame.scene, vpls, p, vpls.ray), all_vpls.version[vpls.ray])
         io.report(VPLS_ALIVE.name, len(vpls))
         io.report(VPLS_WAITING.name, all_vpls.waiting)
 

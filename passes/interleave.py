@@ -1,17 +1,18 @@
-"""Deal the VPLs to the pixels of a block (Keller and Heidrich 2001): lights -> vpls, in the order of their shares."""
+"""Deal the VPLs to the pixels of a block (Keller and Heidrich 2001): vpls -> dealt, in the order of their shares."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_culling import in_order, shining_first
+from deferred_ir.frame.light_culling import put_shining_first
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_buffer import DEFINES
 from deferred_ir.frame.vpl_params import SHARES
 from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
@@ -28,20 +29,20 @@ class Params:
 
 
 class Interleave(Pass):
-    """The VPLs, without the spotlight, one share after the other."""
+    """The VPLs, one share after the other."""
 
     Params = Params
-    inputs: ClassVar[Mapping[str, Input]] = {"lights": Input("the spotlight, then the VPLs", format="light")}
+    inputs: ClassVar[Mapping[str, Input]] = {"vpls": Input("the VPLs", format="vpl")}
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """A buffer of as many lights."""
-        lights, n = inputs["lights"], self.params.n
-        assert isinstance(lights, Buffer)
+        """A buffer of as many VPLs."""
+        vpls, n = inputs["vpls"], self.params.n
+        assert isinstance(vpls, Buffer)
         if n & (n - 1):
             raise GraphError(f"n {n}: wants 1, 2, 4 or 8")
-        vpls = Buffer("share", lights.records, lights.stride, lights.block, parts=n * n)
-        defines = {"INTERLEAVE": n, "LIGHTS_PER_BLOCK": lights.block}
-        return {"vpls": Output("the VPLs in the order of their shares", vpls, defines, meta=SharesMeta(n))}
+        dealt = replace(vpls, format="share", parts=n * n)
+        defines = {**DEFINES, "INTERLEAVE": n}
+        return {"dealt": Output("the VPLs in the order of their shares", dealt, defines, meta=SharesMeta(n))}
 
     def state_facts(self, facts: Facts) -> Statements:
         """State into how many shares the VPLs are dealt."""
@@ -60,13 +61,10 @@ class Interleave(Pass):
     def execute(self, frame: Frame, io: Io) -> None:
         """Shuffle and upload, those without power last in each part of a share that one draw adds up."""
         del frame
-        lights = io["lights"].records
-        vpls = lights[in_order(lights)[1:]]
-        order = deal(vpls["tile"].astype(int), io["lights"].description.records - 1)
-        parts = np.union1d(
-            find_share_starts(len(vpls), self.params.n), np.arange(0, len(vpls), io["vpls"].description.block)
-        )
-        io["vpls"].write(shining_first(vpls[order], parts))
+        vpls, capacity = io["vpls"].records, io["vpls"].description
+        order = deal(vpls["tile"].astype(int), capacity.records)
+        parts = np.union1d(find_share_starts(len(vpls), self.params.n), np.arange(0, len(vpls), capacity.block))
+        io["dealt"].write(put_shining_first(vpls[order], parts))
 
 
 PASS = Interleave

@@ -10,19 +10,21 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_culling import last_shining
+from deferred_ir.frame.light_culling import count_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.vpl_params import VPLS
 from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
+from deferred_ir.shadows.filter import VplFilter
 from deferred_ir.vpls.interleaving import SharesMeta, find_share_starts, find_sub_buffers
 
 
 class Interleaved(Pass):
     """Irradiance from n^2 times a pixel's share of the VPLs."""
 
+    Params = VplFilter
     inputs: ClassVar[Mapping[str, Input]] = {
         "vpls": Input("the VPLs in the order of their shares", format="share"),
         "depth": Input("reversed depth", format="depth32f"),
@@ -35,7 +37,9 @@ class Interleaved(Pass):
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Irradiance before albedo, which the filter must not blur."""
         del inputs
-        return {"shares": Output("irradiance in sub-buffers; 0 on the background", Texture("rgba32f"), transient=True)}
+        doc = "irradiance in sub-buffers; 0 on the background"
+        # With the defines of its filter: who lights what is missing in the sub-buffers filters alike.
+        return {"shares": Output(doc, Texture("rgba32f"), self.params.vpl_defines(), transient=True)}
 
     def depends(self) -> frozenset[str]:
         """Positions come back from the depth."""
@@ -49,7 +53,7 @@ class Interleaved(Pass):
         """A draw for each share, or more where it crosses from block to block of the buffer."""
         vpls, n = io["vpls"], io.meta("vpls", SharesMeta).n
         ctx, block = io.gpu.ctx, vpls.description.block
-        program = io.program("light_shares.frag", defines=shader_variants.of_pixels(frame, vpls.records))
+        program = io.program("light_shares.frag", defines=shader_variants.choose_for_pixels(frame, vpls.records))
         ctx.blend_func = ctx.ONE, ctx.ONE
         starts = find_share_starts(len(vpls.records), n).tolist()
         for share, rectangle in enumerate(find_sub_buffers(frame.size, n)):
@@ -57,9 +61,9 @@ class Interleaved(Pass):
             start, stop = starts[share : share + 2]
             # An empty share is drawn as well: the filter counts its pixels.
             for number in range(start // block, max(stop - 1, start) // block + 1):
-                vpls.bind_uniform(1, number)
+                vpls.bind(number)
                 first, end = max(start, number * block), min(stop, (number + 1) * block)
-                begins, count = first == start, last_shining(vpls.records[first:end])
+                begins, count = first == start, count_shining(vpls.records[first:end])
                 if not begins and not count:
                     continue
                 first -= number * block

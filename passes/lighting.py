@@ -1,26 +1,27 @@
-"""Add up the spotlight and all VPLs in one fullscreen pass: lights, G-buffer, shadows -> radiance.
+"""Add up direct lights and VPLs in one fullscreen pass: lights, vpls, G-buffer, shadows -> radiance.
 
-One shader for all lights: it reads them from a uniform block and their shadows from one texture array. More lights than
-a block holds are drawn block by block and added in 32-bit floats.
+One shader for all lights: it reads them from uniform blocks and their shadows from one texture array. More VPLs than a
+block holds are drawn block by block and added in 32-bit floats.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_culling import last_shining
+from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.frame.screen_tiles import FEWEST, Tiles, draws
+from deferred_ir.frame.screen_tiles import FEWEST, Tiles, list_draws
+from deferred_ir.frame.vpl_buffer import BINDING, VPL, VPLS_PER_BLOCK
 from deferred_ir.gl.shaders import Program
 from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
-from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 from deferred_ir.shadows import shader_variants
+from deferred_ir.shadows.filter import ShadowFilter
 
 LIGHTS_SKIPPED = Figure(
     "lights_skipped",
@@ -33,8 +34,10 @@ class Lighting(Pass):
     """Reflected radiance rho/pi * sum of I(w) cos V / d^2, linear RGB."""
 
     figures = (LIGHTS_SKIPPED,)
+    Params = ShadowFilter
     inputs: ClassVar[Mapping[str, Input]] = {
-        "lights": Input("the spotlight, then the VPLs", format="light"),
+        "lights": Input("the direct lights", format="light"),
+        "vpls": Input("the VPLs", format="vpl"),
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
         "albedo": Input("reflectance", format="rgba16f"),
@@ -42,6 +45,7 @@ class Lighting(Pass):
         "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
         "indirect": Input("irradiance from the VPLs, instead of adding them up", format="rgba32f", optional=True),
         "thin": Input("irradiance where the filter has left it out", format="rgba32f", optional=True),
+        "views": Input("where the direct lights' maps are", format="view", optional=True),
         "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
         "blockers": Input("the same maps: what hides a part of the spotlight's disc", format="depth32f", optional=True),
     }
@@ -60,42 +64,61 @@ class Lighting(Pass):
         return frozenset({"camera", "models"})
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """One fullscreen draw a block of lights, or one a tile of the screen with the lights that may reach it."""
-        ctx, lights = io.gpu.ctx, io["lights"]
-        records = lights.records[:1] if io["indirect"] else lights.records
-        defines = shader_variants.of_pixels(frame, lights.records[1:]) | shader_variants.of_spotlight(frame, records)
-        program = io.program("lighting.frag", defines=defines)
-        ctx.blend_func = ctx.ONE, ctx.ONE
+        """One fullscreen draw a block of VPLs, or one a tile of the screen with the VPLs that may reach it."""
+        lights, vpls = io["lights"], io["vpls"].records
+        lights.bind()
+        if io["views"]:
+            io["views"].bind()
+        views = io["views"].records if io["views"] else None
+        defines = shader_variants.choose_for_pixels(frame, vpls)
+        defines |= shader_variants.choose_for_lights(frame, lights.records, views)
+        program = io.program("lighting.frag", defines=defines | self.params.defines())
+        io.gpu.ctx.blend_func = io.gpu.ctx.ONE, io.gpu.ctx.ONE
+        if io["indirect"]:
+            vpls = vpls[:0]
         # A GPU would wait for the depth, and has a light's arithmetic for less than a draw.
-        if len(records) > FEWEST and io.gpu.device.kind == "software" and not frame.keep_all:
-            self._draw_tiles(frame, io, program, records)
-            return
-        for start in range(0, len(records), LIGHTS_PER_BLOCK):
-            first = int(start == 0)
-            count = last_shining(records[start + first : start + LIGHTS_PER_BLOCK])
-            if not first and not count:
-                continue
-            lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
-            program.set(first=first, count=first + count)
-            program.draw_fullscreen()
-            ctx.enable(ctx.BLEND)
+        if len(vpls) >= FEWEST and io.gpu.device.kind == "software" and not frame.keep_all:
+            self._draw_tiles(frame, io, program, vpls)
+        else:
+            self._draw_blocks(io, program, vpls)
 
-    def _draw_tiles(self, frame: Frame, io: Io, program: Program, records: np.ndarray) -> None:
-        """The same light by light, without those that a tile lies behind."""
+    def _draw_blocks(self, io: Io, program: Program, vpls: np.ndarray) -> None:
+        """Draw the whole frame once for each block of VPLs."""
+        lit = vpls[find_shining(vpls)]
+        packed = np.zeros(-(-len(lit) // VPLS_PER_BLOCK) * VPLS_PER_BLOCK, VPL)
+        packed[: len(lit)] = lit
+        buffer = io.gpu.uniforms(packed.tobytes()) if len(lit) < len(vpls) else None
+        for start in range(0, max(len(lit), 1), VPLS_PER_BLOCK):
+            if buffer:
+                _bind(buffer, start)
+            else:
+                io["vpls"].bind(start // VPLS_PER_BLOCK)
+            self._draw(io, program, first=start == 0, count=min(len(lit) - start, VPLS_PER_BLOCK))
+
+    def _draw_tiles(self, frame: Frame, io: Io, program: Program, vpls: np.ndarray) -> None:
+        """Draw the frame tile by tile, without the VPLs that a tile lies behind: they would add nothing."""
         tiles = Tiles.of(io["depth"].read()[..., 0], frame.scene.camera, frame.near)
-        packed, made = draws(tiles, records)
+        packed, draws = list_draws(tiles, vpls)
         io.gpu.ctx.finish()  # maps that are still being drawn would be timed with what comes after this pass
         buffer = io.gpu.uniforms(packed.tobytes())
         io.framebuffer.clear_color()
-        size = LIGHTS_PER_BLOCK * records.itemsize
-        for draw in made:
-            buffer.bind_to_uniform_block(1, offset=draw.start * records.itemsize, size=size)
+        for draw in draws:
+            _bind(buffer, draw.start)
             io.gpu.scissor(draw.rectangle)
-            if not draw.first:
-                io.gpu.ctx.enable(io.gpu.ctx.BLEND)
-            program.set(first=draw.first, count=draw.count)
-            program.draw_fullscreen()
-        io.count(LIGHTS_SKIPPED.name, len(tiles.rectangles) * (len(records) - 1) - sum(d.count - d.first for d in made))
+            self._draw(io, program, first=draw.first, count=draw.count)
+        io.count(LIGHTS_SKIPPED.name, len(tiles.rectangles) * len(vpls) - sum(draw.count for draw in draws))
+
+    def _draw(self, io: Io, program: Program, *, first: bool, count: int) -> None:
+        """Draw `count` VPLs of the bound block; the first draw of a pixel has the direct lights, later ones add up."""
+        if not first:
+            io.gpu.ctx.enable(io.gpu.ctx.BLEND)
+        program.set(direct=len(io["lights"].records) if first else 0, count=count)
+        program.draw_fullscreen()
+
+
+def _bind(buffer: Any, start: int) -> None:
+    """Make the VPL records from `start` on visible as a block."""
+    buffer.bind_to_uniform_block(BINDING, offset=start * VPL.itemsize, size=VPLS_PER_BLOCK * VPL.itemsize)
 
 
 PASS = Lighting

@@ -1,4 +1,4 @@
-"""Give back by short rays what the clamp takes (Kollig and Keller 2004): lights, G-buffer -> residual.
+"""Give back by short rays what the clamp takes (Kollig and Keller 2004): vpls, G-buffer -> residual.
 
 The G-buffer is read back, Embree traces on the CPU, and the residual goes up as a texture, to be filtered with the
 light of the VPLs that it completes.
@@ -12,8 +12,8 @@ from typing import ClassVar
 
 from deferred_ir.frame.facts import EMITS
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_buffer import LightsMeta, read_limits
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_buffer import VplsMeta, read_limits
 from deferred_ir.frame.vpl_params import CLAMP_RETURNED, CLAMPED
 from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
@@ -38,8 +38,8 @@ class NearField(Pass):
 
     Params = Params
     inputs: ClassVar[Mapping[str, Input]] = {
-        "lights": Input("the spotlight, then the VPLs: their clamp and cone", format="light"),
-        "vpls": Input("the VPLs as dealt to pixels, whose blocks the rays' pattern shares", "share", optional=True),
+        "vpls": Input("the VPLs: their clamp and cone", format="vpl"),
+        "dealt": Input("the VPLs as dealt to pixels, whose blocks the rays' pattern shares", "share", optional=True),
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
     }
@@ -67,15 +67,15 @@ class NearField(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Read back, trace, upload."""
-        vpl = io["lights"].records[1:2]
-        if len(vpl) == 0:
+        vpls = io["vpls"].records
+        if len(vpls) == 0:
             io.framebuffer.clear_color()
             return
-        block = io.meta("vpls", SharesMeta).n if io["vpls"] else 1
+        block = io.meta("dealt", SharesMeta).n if io["dealt"] else 1
         seen = frame.read_surfaces(io["depth"], io["normals"])
         job = PixelJob(frame.tracer(), seen, frame.size, block, frame.seed)
-        bounces = io.meta("lights", LightsMeta).bounces
-        image = trace_residual(job, read_limits(vpl), samples=self.params.samples, bounces=bounces)
+        bounces = io.meta("vpls", VplsMeta).bounces
+        image = trace_residual(job, read_limits(vpls), samples=self.params.samples, bounces=bounces)
         io["residual"].upload(image)
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from deferred_ir.frame.costs import estimate_map_cost, estimate_ray_cost
 from deferred_ir.frame.facts import EMITS, PIXELS, SOFTWARE, TRIANGLES
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_buffer import read_limits, read_vpls
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_buffer import read_limits, read_vpls
 from deferred_ir.frame.vpl_params import SHARES
 from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param

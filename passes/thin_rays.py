@@ -14,8 +14,8 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.base.parallel import run_in_order
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_buffer import read_limits, read_vpls
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_buffer import read_limits, read_vpls
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.rays.pixel_surfaces import Surfaces
@@ -67,7 +67,7 @@ class ThinRays(Pass):
 
 
 def _irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, parts: int) -> Array:
-    """Of surfaces (n), from those of `parts` shares of the VPLs (LIGHT records) that have a bit in bits (n, 2)."""
+    """Of surfaces (n), from those of `parts` shares of the VPLs (VPL records) that have a bit in bits (n, 2)."""
     geometry = tracer.scene.geometry
     scaled = ScaledVpls.from_vpls(tracer, read_vpls(vpls), read_limits(vpls))
     starts = find_share_starts(len(vpls), round(parts**0.5)).tolist()

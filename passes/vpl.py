@@ -1,4 +1,4 @@
-"""Cast VPLs (Keller 1997) on the CPU: -> lights, the spotlight's record and then one for each living VPL."""
+"""Cast VPLs (Keller 1997) on the CPU: -> vpls, a record for each."""
 
 from __future__ import annotations
 
@@ -9,24 +9,17 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_buffer import MapVersions, output, packed
-from deferred_ir.frame.light_culling import dropped, shining
+from deferred_ir.frame.light_culling import LIGHTS_DROPPED, find_reaching
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_buffer import MapVersions, describe_output, pack_vpls
 from deferred_ir.frame.vpl_params import VPLS_ALIVE, CastParams
 from deferred_ir.graph.facts import Facts, Statements
-from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Output
 from deferred_ir.sampling.patterns import warn_unbalanced
 from deferred_ir.vpls.cast import NONE, Vpls, cast
 from deferred_ir.vpls.resampling import estimate_effects, find_probes, resample
-
-LIGHTS_DROPPED = Figure(
-    "lights_dropped",
-    "VPLs whose map is not drawn.",
-    left_out=("maps of {n} lights", "they light nothing that is seen"),
-)
 
 
 @dataclass(frozen=True)
@@ -50,9 +43,9 @@ class Vpl(Pass):
         warn_unbalanced(self.params.pattern, self.params.count)
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """One buffer with room for the spotlight and a VPL for each ray of each bounce."""
+        """One buffer with room for a VPL for each ray of each bounce."""
         del inputs
-        return {"lights": output(self.params.count * self.params.bounces, self.params.bounces)}
+        return {"vpls": describe_output(self.params, self.params.bounces)}
 
     def state_facts(self, facts: Facts) -> Statements:
         """State whether there may be VPLs, and whether they are clamped."""
@@ -67,11 +60,12 @@ class Vpl(Pass):
         """Cast, pack, upload."""
         light, p = frame.scene.spotlight, self.params
         vpls = self._cast(frame) if p.count > 0 and any(light.emission) else NONE
-        records, lights = packed(frame.scene, vpls, p, np.arange(len(vpls))), io["lights"]
-        if frame.by_view and any(light.emission):
-            records = dropped(records, frame.buffers.clusters, frame.scene.camera, frame.size)
-            io.count(LIGHTS_DROPPED.name, int((~shining(records)).sum()))
-        lights.write(records, io.state.update(records, frame.scene) if frame.reuse else None)
+        records = pack_vpls(frame.scene, vpls, p, np.arange(len(vpls)))
+        if frame.by_view and len(vpls):
+            reaches = find_reaching(records, frame.buffers.clusters, frame.scene.camera, frame.size)
+            records["emission"][~reaches] = 0
+            io.count(LIGHTS_DROPPED.name, int((~reaches).sum()))
+        io["vpls"].write(records, io.state.update(records, frame.scene) if frame.reuse else None)
         io.report(VPLS_ALIVE.name, len(vpls))
 
     def _cast(self, frame: Frame) -> Vpls:

@@ -1,23 +1,27 @@
-// Radiance from the spotlight, or from LIGHTS_PER_DRAW VPLs or fewer, each with a depth map of its own; blending adds up
-// the draws.
+// Radiance from one direct light, or from LIGHTS_PER_DRAW VPLs or fewer, each with a depth map of its own; blending adds
+// up the draws.
 #include "lib/surface/surface.glsl"
-#include "lib/lights/light.glsl"
-#if HAS_SPOT || HAS_VPLS
+#include "lib/lights/spot.glsl"
+#include "lib/lights/vpl.glsl"
+#if HAS_LIGHT_MAPS && HAS_VPL_MAPS
 #include "lib/shadows/single.glsl"
-#include "lib/shadows/soft.glsl"
+#include "lib/shadows/light_visibility.glsl"
+#include "lib/shadows/vpl_visibility.glsl"
 #endif
 
 layout(binding = UNIT_PRIMITIVES) uniform usampler2D primitives;
-#if DIRECT && HAS_SPOT
-layout(binding = UNIT_MAPS) uniform sampler2DShadow spot;
+#if DIRECT && HAS_LIGHT_MAPS
+layout(binding = UNIT_MAPS) uniform sampler2DShadow light_maps;
 #if HAS_BLOCKERS && SOFT && DISC
 layout(binding = UNIT_BLOCKERS) uniform sampler2D blockers;
 #endif
-#elif !DIRECT && HAS_VPLS
-layout(binding = UNIT_MAPS) uniform sampler2DShadow vpls[LIGHTS_PER_DRAW];
+#elif !DIRECT && HAS_VPL_MAPS
+layout(binding = UNIT_MAPS) uniform sampler2DShadow vpl_maps[LIGHTS_PER_DRAW];
 #endif
-#if !DIRECT
-uniform int numbers[LIGHTS_PER_DRAW];  // of this draw's lights, in this block
+#if DIRECT
+uniform int number;  // of the light
+#else
+uniform int numbers[LIGHTS_PER_DRAW];  // of this draw's VPLs, in this block
 uniform int count;
 #endif
 
@@ -28,18 +32,18 @@ void main() {
     Surface s = surface();
     vec3 irradiance = vec3(0.0);
 #if DIRECT
-    irradiance = spot_irradiance(lights[0], s.position, s.normal, s.shading_normal);
-#if HAS_SPOT && HAS_BLOCKERS && SOFT && DISC
-    irradiance *= spot_visibility(spot, blockers, lights[0], s.position, s.normal);
-#elif HAS_SPOT
-    irradiance *= spot_visibility(spot, lights[0], s.position, s.normal);
+    irradiance = spot_irradiance(lights[number], s.position, s.normal, s.shading_normal);
+#if HAS_LIGHT_MAPS && HAS_BLOCKERS && SOFT && DISC
+    irradiance *= light_visibility(light_maps, blockers, lights[number], s.position, s.normal);
+#elif HAS_LIGHT_MAPS
+    irradiance *= light_visibility(light_maps, lights[number], s.position, s.normal);
 #endif
 #else
     for (int i = 0; i < LIGHTS_PER_DRAW; ++i) {
         if (i >= count) break;
-        vec3 arriving = vpl_irradiance(lights[numbers[i]], s.position, s.normal, s.shading_normal);
-#if HAS_VPLS
-        arriving *= vpl_visibility(vpls[i], lights[numbers[i]], s.position, s.normal);
+        vec3 arriving = vpl_irradiance(vpls[numbers[i]], s.position, s.normal, s.shading_normal);
+#if HAS_VPL_MAPS
+        arriving *= vpl_visibility(vpl_maps[i], vpls[numbers[i]], s.position, s.normal);
 #endif
         irradiance += arriving;
     }

@@ -1,14 +1,14 @@
-// Irradiance from VPLs first to end of a block of lights, on the pixels of one share, in its sub-buffer.
+// Irradiance from VPLs first to end of a block, on the pixels of one share, in its sub-buffer.
 #include "lib/camera/frame.glsl"
 #include "lib/surface/gbuffer.glsl"
-#include "lib/lights/light.glsl"
-#include "lib/shadows/visibility.glsl"
+#include "lib/lights/vpl.glsl"
 #include "lib/shares/places.glsl"
 #if HAS_RAYS
 #include "lib/shares/ray_masks.glsl"
-#define VISIBILITY(i) ray_visibility(before + i)
-#else
-#define VISIBILITY(i) VPL_VISIBILITY(lights[i])
+#elif HAS_SHADOWS
+#include "lib/shadows/atlas.glsl"
+#include "lib/shadows/vpl_visibility.glsl"
+layout(binding = UNIT_SHADOWS) uniform sampler2DArrayShadow shadows;
 #endif
 #if HAS_NEAR_FIELD
 layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
@@ -24,6 +24,17 @@ uniform int before;  // of VPLs of its share before this block; below 0 where th
 
 layout(location = 0) out vec4 irradiance;  // alpha: the shading normal, for the filter
 
+// Of VPL i of the block.
+float visibility(int i, vec3 position, vec3 normal) {
+#if HAS_RAYS
+    return ray_visibility(before + i);
+#elif HAS_SHADOWS
+    return vpl_visibility(shadows, vpls[i], position, normal);
+#else
+    return 1.0;
+#endif
+}
+
 void main() {
     ivec2 size = textureSize(depth, 0);
     ivec2 pixel = whole_place(ivec2(gl_FragCoord.xy), share, size);
@@ -38,7 +49,7 @@ void main() {
     decode_normals(code, shading_normal, normal);
     vec3 sum = vec3(0.0);
     for (int i = first; i < end; ++i)
-        sum += vpl_irradiance(lights[i], position, normal, shading_normal) * VISIBILITY(i);
+        sum += vpl_irradiance(vpls[i], position, normal, shading_normal) * visibility(i, position, normal);
     sum *= float(INTERLEAVE * INTERLEAVE);
 #if HAS_NEAR_FIELD
     if (begins) sum += texelFetch(near_field, pixel, 0).rgb;  // to be filtered with the rest

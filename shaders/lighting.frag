@@ -1,8 +1,17 @@
-// Radiance from the spotlight and one block of lights; further blocks are added by blending.
+// Radiance from the direct lights and one block of VPLs; further blocks are added by blending.
 #include "lib/camera/frame.glsl"
 #include "lib/surface/gbuffer.glsl"
-#include "lib/lights/light.glsl"
-#include "lib/shadows/visibility.glsl"
+#include "lib/lights/spot.glsl"
+#include "lib/lights/vpl.glsl"
+#if HAS_SHADOWS
+#include "lib/shadows/atlas.glsl"
+#include "lib/shadows/light_visibility.glsl"
+#include "lib/shadows/vpl_visibility.glsl"
+layout(binding = UNIT_SHADOWS) uniform sampler2DArrayShadow shadows;
+#if HAS_BLOCKERS && SOFT && DISC
+layout(binding = UNIT_BLOCKERS) uniform sampler2DArray blockers;
+#endif
+#endif
 
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
@@ -18,11 +27,29 @@ layout(binding = UNIT_THIN) uniform sampler2D thin;
 #elif HAS_NEAR_FIELD
 layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
 #endif
-uniform int first;  // light of this block to start with; 1 where light 0 is the spotlight
-uniform int count;  // lights of this block, where they are not in `indirect` already
+uniform int direct;  // direct lights to add up: all in the first draw of a pixel, else none
+uniform int count;   // VPLs of the block, where they are not in `indirect` already
 
 in vec2 ndc;
 layout(location = 0) out vec4 radiance;
+
+float visibility(DirectLight light, vec3 position, vec3 normal) {
+#if !HAS_SHADOWS
+    return 1.0;
+#elif HAS_BLOCKERS && SOFT && DISC
+    return light_visibility(shadows, blockers, light, position, normal);
+#else
+    return light_visibility(shadows, light, position, normal);
+#endif
+}
+
+float visibility(Vpl vpl, vec3 position, vec3 normal) {
+#if HAS_SHADOWS
+    return vpl_visibility(shadows, vpl, position, normal);
+#else
+    return 1.0;
+#endif
+}
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -37,11 +64,11 @@ void main() {
     decode_normals(code, shading_normal, normal);
     vec3 irradiance = vec3(0.0);
 #if HAS_SPOTLIGHT
-    if (first == 1) irradiance = lights[0].emission * texelFetch(spotlight, pixel, 0).r;
+    if (direct > 0) irradiance = lights[0].emission * texelFetch(spotlight, pixel, 0).r;
 #else
-    if (first == 1)
-        irradiance = spot_irradiance(lights[0], position, normal, shading_normal)
-                   * SPOT_VISIBILITY(lights[0]);
+    for (int i = 0; i < direct; ++i)
+        irradiance += spot_irradiance(lights[i], position, normal, shading_normal)
+                    * visibility(lights[i], position, normal);
 #endif
 #if HAS_INDIRECT  // with the near field in it
     irradiance += texelFetch(indirect, pixel, 0).rgb;
@@ -50,11 +77,10 @@ void main() {
 #endif
 #else
 #if HAS_NEAR_FIELD
-    if (first == 1) irradiance += texelFetch(near_field, pixel, 0).rgb;
+    if (direct > 0) irradiance += texelFetch(near_field, pixel, 0).rgb;
 #endif
-    for (int i = first; i < count; ++i)
-        irradiance += vpl_irradiance(lights[i], position, normal, shading_normal)
-                    * VPL_VISIBILITY(lights[i]);
+    for (int i = 0; i < count; ++i)
+        irradiance += vpl_irradiance(vpls[i], position, normal, shading_normal) * visibility(vpls[i], position, normal);
 #endif
     radiance = vec4(texelFetch(albedo, pixel, 0).rgb * irradiance * INVERSE_PI, 1.0);
 }

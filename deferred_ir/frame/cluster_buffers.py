@@ -58,7 +58,7 @@ class ClusterBuffers:
     def draw(self, program: Program, visible: Bools, lights: Ints, patches: bool = False) -> None:
         """Draw cluster c for light lights[l] of the bound block wherever visible[l, c], bool (lights, clusters).
 
-        The program reads `position` and `light_index`.
+        The program reads `position` and `view_index`.
         """
         cluster, row = np.nonzero(visible.T)
         light = lights[row]
@@ -82,7 +82,7 @@ class ClusterBuffers:
         """Return the vertex array with what `program` reads."""
         if self not in program.arrays:
             # An instanced attribute counts from base_instance; gl_InstanceID does not.
-            known = [(self._positions, "3f", "position"), (self._lights, "1i/i", "light_index")]
+            known = [(self._positions, "3f", "position"), (self._lights, "1i/i", "view_index")]
             attributes = [attribute for attribute in known if attribute[2] in program.attributes]
             program.arrays[self] = self.gpu.ctx.vertex_array(
                 program.glsl, attributes, self._indices, index_element_size=4

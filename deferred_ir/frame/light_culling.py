@@ -1,7 +1,7 @@
 """Lights that light nothing which the camera sees keep their record and their tile, but lose their power. No OpenGL.
 
-Where lights are looped over, those with power stand first in each part that one draw adds up, in their order. So sums
-have the terms that they have with all lights but for zeros, in the same order, and are the same to the last bit.
+Where VPLs are looped over, those with power stand first in each part that one draw adds up, in their order. So sums
+have the terms that they have with all VPLs but for zeros, in the same order, and are the same to the last bit.
 """
 
 from __future__ import annotations
@@ -9,61 +9,49 @@ from __future__ import annotations
 import numpy as np
 
 from deferred_ir.base.arrays import Bools, Ints
+from deferred_ir.graph.figures import Figure
 from deferred_ir.meshes.clusters import Clusters
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import LIGHT, LIGHTS_PER_BLOCK
+
+LIGHTS_DROPPED = Figure(
+    "lights_dropped",
+    "Lights whose map is not drawn.",
+    left_out=("maps of {n} lights", "they light nothing that is seen"),
+)
 
 MARGIN = 1e-5
 """Of the largest distances that pixels' positions are made of: they come back from a depth, and 32 bits err by 1e-7."""
+AXES = np.dtype([(name, "f4", 3) for name in ("position", "x_axis", "y_axis", "z_axis")])
 STRIDE = 16
 """One cluster is enough to keep a light, and nearly all find theirs among every 16th."""
 
 
-def shining(records: np.ndarray) -> Bools:
-    """Which LIGHT records (n,) have power, bool (n,)."""
+def find_shining(records: np.ndarray) -> Bools:
+    """Return which records (n,), of direct lights or VPLs, have power, bool (n,)."""
     lit: Bools = (records["emission"] != 0).any(axis=1)
     return lit
 
 
-def last_shining(records: np.ndarray) -> int:
-    """How many of the LIGHT records (n,) must be looped over: up to the last that has power."""
-    lit = np.flatnonzero(shining(records))
+def count_shining(records: np.ndarray) -> int:
+    """Return how many of the VPL records (n,) must be looped over: up to the last that has power."""
+    lit = np.flatnonzero(find_shining(records))
     return int(lit[-1]) + 1 if len(lit) else 0
 
 
-def shining_first(records: np.ndarray, starts: Ints) -> np.ndarray:
-    """LIGHT records (n,) with those first that have power, in each of the parts that begin at `starts`, ascending."""
+def put_shining_first(records: np.ndarray, starts: Ints) -> np.ndarray:
+    """Return VPL records (n,), those with power first in each of the parts that begin at `starts`, ascending."""
     part = np.searchsorted(starts, np.arange(len(records)), side="right")
-    return records[np.lexsort((~shining(records), part))]
+    return records[np.lexsort((~find_shining(records), part))]
 
 
-def in_order(records: np.ndarray) -> Ints:
-    """Rows of LIGHT records (n,) by their tiles in each block: as they were made, the spotlight first."""
-    order: Ints = np.lexsort((records["tile"], np.arange(len(records)) // LIGHTS_PER_BLOCK))
-    return order
+def find_reaching(records: np.ndarray, clusters: Clusters, camera: Camera, size: tuple[int, int]) -> Bools:
+    """Return which lights may light something that `camera` sees, bool (n,).
 
-
-def dropped(records: np.ndarray, clusters: Clusters, camera: Camera, size: tuple[int, int]) -> np.ndarray:
-    """The light buffer `records`, LIGHT (n,), the spotlight first, without the power of what `camera` sees nothing of.
-
-    size: of the frame, (width, height). In each block those with power come first, behind the spotlight.
-    """
-    needless = ~reaching(records, clusters, camera, size)
-    if not needless.any():
-        return records
-    records = records.copy()
-    records["emission"][needless] = 0
-    starts = np.unique([0, 1, *range(0, len(records), LIGHTS_PER_BLOCK)])
-    return shining_first(records, starts)
-
-
-def reaching(records: np.ndarray, clusters: Clusters, camera: Camera, size: tuple[int, int]) -> Bools:
-    """Which lights may light something that `camera` sees, LIGHT records (n,): bool (n,).
-
-    The others shine on no cluster that lies in the camera's pyramid.
+    records: VPL (n,), or others with the axes of a view that is as wide as the light's cone. size: of the frame,
+    (width, height). The others shine on no cluster that lies in the camera's pyramid.
     """
     rays = camera.ray_axes(size)
-    view = np.zeros(1, LIGHT)
+    view = np.zeros(1, AXES)
     view["position"] = camera.position
     # As a light's: NDC = dot(d, axis) / dot(d, z).
     view["x_axis"], view["y_axis"], view["z_axis"] = rays / (rays**2).sum(axis=1, keepdims=True)

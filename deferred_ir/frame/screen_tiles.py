@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.frame.light_culling import MARGIN, shining
+from deferred_ir.frame.light_culling import MARGIN, find_shining
+from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 
 EDGE = 64
 """Of a tile, pixels: a software driver's own. Smaller ones skip a few more VPLs, and cost more draws than that wins."""
@@ -22,7 +22,7 @@ EDGE = 64
 ALIGNED = 16
 """Lists of lights begin at multiples of so many records: 1280 bytes, since uniform blocks begin at multiples of 256."""
 FEWEST = 8
-"""Fewer VPLs are not worth it."""
+"""Fewest VPLs for which culling by tile pays."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class Tiles:
         return cls(rectangles, (offsets + camera.position).astype(np.float32), (MARGIN * reach).astype(np.float32))
 
     def lit(self, vpls: np.ndarray) -> Bools:
-        """Which tiles each of the VPLs, LIGHT records (n,), may light, bool (t, n)."""
+        """Return which tiles each of the VPLs may light, bool (t, n). vpls: VPL (n,)."""
         x, y, z = (vpls[axis] for axis in ("x_axis", "y_axis", "z_axis"))
         position = vpls["position"]
         slack = self.margin[:, None] + np.float32(MARGIN) * np.abs(position).max(axis=1)
@@ -71,33 +71,33 @@ class Tiles:
 
 @dataclass(frozen=True)
 class Draw:
-    """One draw: a tile, and where in the packed records its lights begin, which is to be the first and how many."""
+    """One draw: a tile, and the VPLs that it adds up in the packed records.
+
+    start, count: where its list of VPLs begins, and how many they are. first: it is the tile's first draw.
+    """
 
     rectangle: tuple[int, int, int, int]
     start: int
-    first: int
     count: int
+    first: bool
 
 
-def draws(tiles: Tiles, records: np.ndarray) -> tuple[np.ndarray, list[Draw]]:
-    """Lists of lights for the tiles, from LIGHT records (n,), the spotlight first: packed records, and draws.
+def list_draws(tiles: Tiles, records: np.ndarray) -> tuple[np.ndarray, list[Draw]]:
+    """Return lists of VPLs for the tiles, from VPL records (n,), as packed records (m,) and the draws that read them.
 
     A tile has a draw for each block of the buffer in which a VPL may light it, with these VPLs in their order, so that
-    its sums are the same; the first block's has the spotlight in any case. Lists begin at multiples of 256 bytes, and
-    have a whole block of records behind them.
+    its sums are the same; the first block's it has in any case. Lists begin at multiples of 256 bytes, and have a whole
+    block of records behind them.
     """
-    chosen = tiles.lit(records[1:]) & shining(records[1:])
-    rows, made, end = [], list[Draw](), 0
-    for start in range(0, len(records), LIGHTS_PER_BLOCK):
-        first = int(start == 0)
-        block = chosen[:, max(start - 1, 0) : start - 1 + LIGHTS_PER_BLOCK]
-        for rectangle, some in zip(tiles.rectangles.tolist(), block, strict=True):
-            lights = np.flatnonzero(some) + start + first
-            if not first and not len(lights):
-                continue
-            listed = np.concatenate([[0], lights]) if first else lights
-            made.append(Draw(tuple(rectangle), end, first, len(listed)))
-            rows += [listed, np.zeros(-len(listed) % ALIGNED, int)]
-            end += len(listed) + len(rows[-1])
-    rows.append(np.zeros(LIGHTS_PER_BLOCK, int))
-    return records[np.concatenate(rows)], made
+    chosen = tiles.lit(records) & find_shining(records)
+    rows, draws, end = [], list[Draw](), 0
+    for start in range(0, max(len(records), 1), VPLS_PER_BLOCK):
+        block = chosen[:, start : start + VPLS_PER_BLOCK]
+        for rectangle, lit in zip(tiles.rectangles.tolist(), block, strict=True):
+            listed = np.flatnonzero(lit) + start
+            if start == 0 or len(listed):
+                draws.append(Draw(tuple(rectangle), end, len(listed), start == 0))
+                rows += [listed, np.zeros(-len(listed) % ALIGNED, int)]
+                end += len(listed) + len(rows[-1])
+    rows.append(np.zeros(VPLS_PER_BLOCK, int))
+    return records[np.concatenate(rows)], draws

@@ -19,11 +19,12 @@ class GpuBuffer:
 
     def __init__(self, gpu: Gpu, description: Buffer) -> None:
         self.gpu, self.description = gpu, description
-        self.nbytes = -(-description.records // description.block) * description.block * description.stride
+        blocks = max(-(-description.records // description.block), 1)  # shaders may bind one, though they read nothing
+        self.nbytes = blocks * description.block * description.stride
         self.buffer = gpu.ctx.buffer(reserve=self.nbytes, dynamic=True)
         gpu.gl.check(f"buffer of {description}")
         self.records: np.ndarray = np.zeros(0)
-        self._contents: tuple[bytes, bytes | None] = b"", None
+        self._contents: tuple[bytes, bytes | None] | None = None
         self.versions: Ints | None = None
         self.version = new_version()
 
@@ -33,15 +34,17 @@ class GpuBuffer:
             raise ValueError(f"{len(records)} records of {records.itemsize} bytes into a buffer of {self.description}")
         contents = records.tobytes(), None if versions is None else versions.tobytes()
         self.records, self.versions = records, versions
+        if contents == self._contents:
+            return
+        self._contents = None  # after a write that fails, the next one counts as a change
         self.buffer.write(contents[0])
-        if contents != self._contents:
-            self.version = new_version()
-        self._contents = contents  # last: after a write that fails, the next one counts as a change
+        self.version = new_version()
+        self._contents = contents
 
-    def bind_uniform(self, binding: int, block: int) -> None:
-        """Bind block number `block` of the records as a uniform block."""
+    def bind(self, block: int = 0) -> None:
+        """Bind block number `block` of the records as the uniform block of its description."""
         nbytes = self.description.block * self.description.stride
-        self.buffer.bind_to_uniform_block(binding, offset=block * nbytes, size=nbytes)
+        self.buffer.bind_to_uniform_block(self.description.binding, offset=block * nbytes, size=nbytes)
 
     def release(self) -> None:
         """Delete the buffer."""

@@ -37,7 +37,8 @@ class Texture:
 class Buffer:
     """A buffer of up to `records` records of `format`, `stride` bytes each, allocated in blocks of `block` records.
 
-    parts: how many nearly equal parts its records are dealt into, one after the other.
+    parts: how many nearly equal parts its records are dealt into, one after the other. binding: the uniform block in
+    which shaders read a block of it.
     """
 
     format: str
@@ -45,6 +46,7 @@ class Buffer:
     stride: int
     block: int = 1
     parts: int = 1
+    binding: int = 0
 
     def __str__(self) -> str:
         return f"{self.records} {self.format}"

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Bools, Ints
-from deferred_ir.frame.light_culling import shining
+from deferred_ir.frame.direct_lights import CAPACITY
+from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.shadows.settings import MapParams
@@ -17,7 +18,7 @@ from deferred_ir.shadows.settings import MapParams
 
 @dataclass(frozen=True)
 class FrameMaps:
-    """The maps of one frame's lights.
+    """The maps of one frame: those of the direct lights' views, then those of the VPLs.
 
     places, versions: int (n,); without versions every map is drawn in every frame. shining: bool (n,), which lights
     have power, and so need a map. dirty: bool (n,), which maps must be drawn.
@@ -30,7 +31,8 @@ class FrameMaps:
 
 
 class AtlasCache:
-    """What an atlas holds, from frame to frame. Place 0 is the spotlight's layer, place 1 + t tile t of the VPLs.
+    """What an atlas holds, from frame to frame. The first places are the layers of views of direct lights, behind
+    them come the tiles of the VPLs.
 
     params: with which its maps were drawn. versions: int (all places,), the version of the light whose map is in each
     place, 0 for none.
@@ -48,13 +50,17 @@ class AtlasCache:
         all_tiles: there is room for all lights that there may ever be; otherwise for those of the frame, unless their
         maps are to be used again.
         """
-        atlas, lights = io["atlas"], io["lights"]
-        places = lights.records["tile"].astype(int) + 1
-        versions, lit = lights.versions, shining(lights.records)
+        atlas, lights, vpls = io["atlas"], io["lights"], io["vpls"]
+        tiles = vpls.records["tile"].astype(int)
+        places = np.concatenate([np.arange(len(lights.records)), CAPACITY + tiles])
+        shining = find_shining(vpls.records)
+        lit = np.concatenate([find_shining(lights.records), shining])
+        reusable = lights.versions is not None and vpls.versions is not None
+        versions = np.concatenate([lights.versions, vpls.versions]) if reusable else None
         per_layer = (atlas.size[0] // params.vpl_size) ** 2
         layers = atlas.description.layers
         if versions is None and not all_tiles:
-            layers = 1 - (-int(places[lit].max(initial=0)) // per_layer)
+            layers = CAPACITY - (-(1 + int(tiles[shining].max(initial=-1))) // per_layer)
         io.fit("atlas", layers)
         cache: AtlasCache = io.state  # a new one if the atlas did not fit
         before = cache.frame
@@ -63,7 +69,7 @@ class AtlasCache:
             cache._clear_dirty(atlas, cache.frame, params)
         else:
             io.framebuffer.clear_depth()
-            cache.versions = np.zeros(1 + (atlas.description.layers - 1) * per_layer, np.int64)
+            cache.versions = np.zeros(CAPACITY + (atlas.description.layers - CAPACITY) * per_layer, np.int64)
             cache.params, cache.frame = params, FrameMaps(places, versions, lit, lit)
         return cache.frame
 
@@ -71,11 +77,11 @@ class AtlasCache:
         edge = params.vpl_size
         per_row = atlas.size[0] // edge
         for place in frame.places[frame.dirty]:
-            if place == 0:
-                atlas.clear_part(0, (0, 0), params.spot_size)
+            if place < CAPACITY:
+                atlas.clear_part(int(place), (0, 0), params.spot_size)
             else:
-                layer, tile = divmod(int(place) - 1, per_row**2)
-                atlas.clear_part(1 + layer, (tile % per_row * edge, tile // per_row * edge), edge)
+                layer, tile = divmod(int(place) - CAPACITY, per_row**2)
+                atlas.clear_part(CAPACITY + layer, (tile % per_row * edge, tile // per_row * edge), edge)
 
     def remember(self) -> None:
         """Note that the frame's maps are drawn."""

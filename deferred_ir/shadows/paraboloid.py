@@ -1,15 +1,17 @@
 """Drawing paraboloid maps: what is small in a map goes there as it is, the rest is split first.
 
 Between its corners a triangle's edges are straight in a map, while lines of the scene are curved in a paraboloid. The
-GPU splits edges (shaders/shadow_maps/paraboloid.tesc), but doing so for every triangle and light would cost more than
+GPU splits edges (shaders/shadow_maps/paraboloid.tesc), but doing so for every triangle and view would cost more than
 it is worth: clusters none of whose edges can bend by more than `bend` texels are drawn as they are.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from deferred_ir.base.arrays import Bools
+from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.frame.cluster_buffers import ClusterBuffers
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.shadows.settings import LEAST_REACH, MapParams
@@ -18,24 +20,37 @@ FILES = ("shadow_maps/paraboloid.frag", "shadow_maps/paraboloid.vert")
 SPLIT = ("shadow_maps/paraboloid.tesc", "shadow_maps/paraboloid.tese")
 
 
-def draw(mesh: ClusterBuffers, io: Io, params: MapParams, records: np.ndarray, chosen: Bools, *, layered: bool) -> None:
-    """Draw `mesh` for the lights `chosen`, bool (n,), of the bound block, whose records (n,) are given.
+@dataclass(frozen=True, eq=False)
+class MapBatch:
+    """Maps that are drawn together: the rows `chosen` (m,) of the bound block of VPLs or of views, `records` (n,).
 
-    layered: into an atlas.
+    vpls: they are VPLs. curved: their maps are paraboloids. size: of the maps, texels, one or (n,).
     """
-    gpu, clusters = io.gpu, mesh.clusters
-    lights = np.flatnonzero(chosen)
-    records = records[lights]
-    visible = clusters.find_visible(records, hemisphere=True)
-    straight = params.tessellation == "pre" and (records["tile"] >= 0).all()
-    bent = np.False_ if straight else clusters.find_bent(records, params.reach(records))
-    gpu.clip(5)  # behind the light, and the map's four sides
+
+    records: np.ndarray
+    chosen: Ints
+    size: Array | float
+    vpls: bool
+    curved: bool
+
+    @property
+    def defines(self) -> dict[str, int | float]:
+        """Tells shaders which block they draw from."""
+        return {"DRAWS_VPLS": int(self.vpls)}
+
+
+def draw_curved(mesh: ClusterBuffers, io: Io, params: MapParams, batch: MapBatch, *, layered: bool) -> None:
+    """Draw `mesh` into paraboloid maps; layered: into an atlas."""
+    gpu, clusters, views = io.gpu, mesh.clusters, batch.records[batch.chosen]
+    straight = batch.vpls and params.tessellation == "pre"
+    visible = clusters.find_visible(views, hemisphere=True)
+    bent = np.False_ if straight else clusters.find_bent(views, params.reach(views, batch.size))
+    gpu.clip(5)  # behind the view, and the map's four sides
     geometry = ["shadow_maps/paraboloid.geom"] if layered and not gpu.layer_from_vertex else []
-    for split, share in ((False, visible & ~bent), (True, visible & bent)):
-        if share.any():
+    for split, drawn in ((False, visible & ~bent), (True, visible & bent)):
+        if drawn.any():
             files = [*FILES, *(SPLIT if split else ()), *geometry]
-            defines: dict[str, int | float] = {"SPLIT": int(split), "STRAIGHT": int(straight)}
-            defines |= {"BEND": float(params.bend), "LEAST_REACH": LEAST_REACH}
-            program = io.program(*files, defines=defines)
-            mesh.draw(program, share, lights, patches=split)
+            shape = {"SPLIT": int(split), "STRAIGHT": int(straight), "BEND": float(params.bend)}
+            program = io.program(*files, defines={**batch.defines, **shape, "LEAST_REACH": LEAST_REACH})
+            mesh.draw(program, drawn, batch.chosen, patches=split)
     gpu.clip(0)

@@ -7,14 +7,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from deferred_ir.base.arrays import Array, Bools
+from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import GraphError
 from deferred_ir.graph.params import param
-from deferred_ir.scene.lights.spot import one_minus_cos
-
-WIDEST_PLANAR = 140.0
-"""A spotlight wider than this, in degrees, gets a paraboloid map: the planar one has few texels for its middle."""
-WIDE = one_minus_cos(WIDEST_PLANAR)
 
 MOST_LAYERS = 2048
 """Of an array texture: what every driver of OpenGL 4.3 takes."""
@@ -29,21 +24,6 @@ class MapParams:
 
     spot_size: int = param(2048, lo=16, hi=16384, doc="Width and height of the spotlight's map, texels.")
     vpl_size: int = param(256, lo=16, hi=4096, doc="Width and height of a VPL's map, texels.")
-    spot_offset: float = param(
-        0.1, lo=0.0, hi=16.0, doc="How far a point is lifted off its face before the spotlight's map is asked, texels."
-    )
-    vpl_offset: float = param(0.25, lo=0.0, hi=16.0, doc="The same before a VPL's map is asked, texels.")
-    spot_kernel: float = param(
-        1.0, lo=1.0, hi=64.0, doc="Filter of the spotlight's map: width in texels. 1: the hardware's 2x2 alone."
-    )
-    vpl_kernel: float = param(1.0, lo=1.0, hi=64.0, doc="The same of a VPL's map.")
-    spot_taps: int = param(16, lo=1, hi=256, doc="Comparisons that a wider filter spreads over the spotlight's map.")
-    vpl_taps: int = param(8, lo=1, hi=256, doc="The same over a VPL's map.")
-    soft: Literal["pcss", "off"] = param(
-        "pcss", doc="Shadows of a spotlight with a radius: percentage-closer soft shadows, or hard ones."
-    )
-    search_taps: int = param(16, lo=1, hi=256, doc="Soft shadows: depths read in each of two searches for blockers.")
-    soft_taps: int = param(32, lo=1, hi=256, doc="Soft shadows: comparisons spread over the penumbra.")
     projection: Literal["perspective", "paraboloid"] = param(
         "perspective", doc="Of the VPLs' maps. The spotlight's is a paraboloid where it is wider than 140 degrees."
     )
@@ -99,31 +79,11 @@ class MapParams:
             )
 
     def defines(self) -> dict[str, int | float]:
-        """For the shaders of writer and readers."""
-        return {
-            "VPL_PARABOLOID": int(self.projection == "paraboloid"),
-            "WIDE_SPOT": WIDE,
-            "SPOT_SIZE": self.spot_size,
-            "VPL_SIZE": self.vpl_size,
-            "SPOT_OFFSET": float(self.spot_offset),
-            "VPL_OFFSET": float(self.vpl_offset),
-            "SPOT_KERNEL": float(self.spot_kernel),
-            "VPL_KERNEL": float(self.vpl_kernel),
-            "SPOT_TAPS": self.spot_taps,
-            "VPL_TAPS": self.vpl_taps,
-            "SOFT": int(self.soft == "pcss"),
-            "SEARCH_TAPS": self.search_taps,
-            "SOFT_TAPS": self.soft_taps,
-        }
-
-    def paraboloid(self, records: np.ndarray) -> Bools:
-        """Which lights' maps are paraboloids, bool (n,); records: LIGHT (n,)."""
-        chosen: Bools = (records["tile"] >= 0) & (self.projection == "paraboloid")
-        chosen |= (records["tile"] < 0) & (records["one_minus_cos"] > WIDE)
-        return chosen
+        """Return the defines of shaders that draw maps or read them."""
+        return {"VPL_PARABOLOID": int(self.projection == "paraboloid"), "VPL_SIZE": self.vpl_size}
 
     def tolerance(self, records: np.ndarray) -> Array:
-        """`vpl_deviation` in lengths of the way from each VPL, LIGHT records (n,): (n,).
+        """Return `vpl_deviation` in lengths of the way from each VPL, (n,). records: VPL (n,).
 
         A texel is widest in the middle of a map.
         """
@@ -131,14 +91,14 @@ class MapParams:
         tolerance: Array = self.vpl_deviation * widest * records["tan_half"] / self.vpl_size
         return tolerance
 
-    def reach(self, records: np.ndarray) -> Array:
-        """How many of its lengths an edge must be away from a light to bend by less than `bend` texels, (n,).
+    def reach(self, records: np.ndarray, size: Array | float) -> Array:
+        """Return how many of its lengths an edge must be away from a view to bend by less than `bend` texels, (n,).
 
-        An edge that subtends an angle a from the light bends by a^2 / 8 of the hemisphere's radius at most. In small
-        maps that is little, but a triangle has to be smaller than the hemisphere, too, to be drawn as it is.
+        records: of views or VPLs (n,). size: of their maps, texels. An edge that subtends an angle a bends by a^2 / 8
+        of the hemisphere's radius at most. In small maps that is little, but a triangle has to be smaller than the
+        hemisphere, too, to be drawn as it is.
         """
-        size = np.where(records["tile"] < 0, self.spot_size, self.vpl_size)
-        reach = np.sqrt(size / (16 * records["curve"] * records["tan_half"] * self.bend))
+        reach = np.sqrt(np.float64(size) / (16 * records["curve"] * records["tan_half"] * self.bend))
         least: Array = np.maximum(reach, LEAST_REACH)
         return least
 

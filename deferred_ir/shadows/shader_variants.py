@@ -8,17 +8,22 @@ from __future__ import annotations
 import numpy as np
 
 from deferred_ir.frame.frame import Frame
-from deferred_ir.scene.lights.spot import is_disc
-from deferred_ir.shadows.settings import WIDE
+
+Defines = dict[str, int | float]
 
 
-def of_pixels(frame: Frame, vpls: np.ndarray) -> dict[str, int | float]:
-    """For pixels that VPLs light, LIGHT records (n,): whether there are shading normals, and a clamp."""
+def choose_for_pixels(frame: Frame, vpls: np.ndarray) -> Defines:
+    """Return defines for pixels that VPLs light: whether there are shading normals, and a clamp. vpls: VPL (n,)."""
     clamped = frame.keep_all or not len(vpls) or bool(vpls["clamp_squared"][0] > 0)
     return {"SMOOTH": int(frame.smooth), "CLAMPED": int(clamped)}
 
 
-def of_spotlight(frame: Frame, lights: np.ndarray) -> dict[str, int | float]:
-    """For what the spotlight lights, the first of the LIGHT records (n,): whether it is a disc, and its projection."""
-    disc: dict[str, int | float] = {"DISC": int(is_disc(lights))}
-    return disc if frame.keep_all else {**disc, "SPOT_PARABOLOID": int(lights["one_minus_cos"][0] > WIDE)}
+def choose_for_lights(frame: Frame, lights: np.ndarray, views: np.ndarray | None) -> Defines:
+    """Return defines for what direct lights light: whether one is a disc, and the projection that all views have.
+
+    lights: LIGHT (n,). views: VIEW (m,), None where shadows come from elsewhere.
+    """
+    defines: Defines = {"DISC": int((lights["radius"] > 0).any())}
+    if views is not None and not frame.keep_all and len(set(views["paraboloid"].tolist())) == 1:
+        defines["VIEWS_PARABOLOID"] = int(views["paraboloid"][0])
+    return defines

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.base.versions import new_version, new_versions
+from deferred_ir.base.versions import new_versions
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.sampling import streams
 from deferred_ir.sampling.disc_voronoi import VoronoiCells, find_most_crowded
@@ -54,7 +54,6 @@ class IncrementalVpls:
         self._rng = streams.incremental_vpls(seed)
         self._offset, self._born = self._rng.random(2), 0
         self._right: Array = np.zeros(3)
-        self._spot: tuple[object, int] = None, 0
         self._maps, self._group = StaleMaps(count), np.zeros(count, np.intp)
         self.weights = np.zeros(count)
         self.used = np.zeros(count, bool)
@@ -116,8 +115,6 @@ class IncrementalVpls:
         changed = self._maps.find_changed(self.shaded_position, self.shaded_normal)
         self._maps.age(changed, on_moved, self.shaded_position)
         self._maps.stale &= self._find_alive()
-        if self._maps.find_changed(np.array([light.position]), light.axis[None]).any():
-            self._spot = None, 0
 
     def _measure_lag(self) -> Array:
         """Return how far each VPL is from where it is shaded from, (count,)."""
@@ -128,13 +125,6 @@ class IncrementalVpls:
         """Return which slots have a VPL, and so a map, bool (count,)."""
         alive: Bools = self.used & self.landed & (self.albedo > 0).any(axis=1)
         return alive
-
-    def find_spot_version(self, light: Spotlight) -> int:
-        """Return a version that changes whenever the spotlight's map would."""
-        view = (light.position, light.look_at, light.fov)
-        if view != self._spot[0]:
-            self._spot = view, new_version()
-        return self._spot[1]
 
     def _turn_basis(self, light: Spotlight) -> None:
         """Turn the disc's basis along with the axis, so that points of a disc light keep their places on it."""

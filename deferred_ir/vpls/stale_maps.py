@@ -17,15 +17,10 @@ MOVED_ALONG = 8.0
 """Factor on the error of a map whose own light moved: everything in it is displaced."""
 
 
-class StaleMaps:
-    """Staleness of the maps of `count` slots.
+class ModelMoves:
+    """Which models moved from frame to frame, and in front of which lights."""
 
-    stale: whether a map must be redrawn, bool (count,). error: how far off it is, (count,), in no unit.
-    """
-
-    def __init__(self, count: int) -> None:
-        self.stale = np.zeros(count, bool)
-        self.error = np.zeros(count)
+    def __init__(self) -> None:
         self._before: Geometry | None = None
         self._boxes: Array = np.zeros((2, 0, 2, 3))
 
@@ -46,6 +41,18 @@ class StaleMaps:
             farthest = ((low + high) / 2 - positions) * axes + (high - low) / 2 * np.abs(axes)
             changed |= farthest.sum(axis=1) > 0
         return changed
+
+
+class StaleMaps(ModelMoves):
+    """Staleness of the maps of `count` slots.
+
+    stale: whether a map must be redrawn, bool (count,). error: how far off it is, (count,), in no unit.
+    """
+
+    def __init__(self, count: int) -> None:
+        super().__init__()
+        self.stale = np.zeros(count, bool)
+        self.error = np.zeros(count)
 
     def age(self, changed: Bools, moved_along: Bools, positions: Array) -> None:
         """Add this frame's motion to the maps' errors, by how far models' boxes moved and how large they look.

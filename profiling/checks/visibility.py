@@ -22,14 +22,19 @@ from deferred_ir.graph.compile import compile
 from deferred_ir.graph.file import graph_hash, load_graph
 from deferred_ir.graph.params import specs
 from deferred_ir.profiling.checks.visibility_pass import FOLDER, VisibilityPairs
-from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
-from deferred_ir.shadows.settings import WIDEST_PLANAR, MapParams
+from deferred_ir.shadows.settings import MapParams
+from deferred_ir.shadows.views import WIDEST_PLANAR
 
 GRAPH = FOLDER / "visibility.toml"
 PASSES = {"visibility_pairs": VisibilityPairs}
+SOURCES = {
+    "spotlight": ("spotlight_pairs", ("lights", "lights")),
+    "vpls": ("vpl_pairs", ("vpl", "vpls")),
+}
+"""Which pass of the graph pairs pixels with lights of a kind, and where the records of these are."""
 MAPS = "shadow_maps"
 VPL_SIZE = f"{MAPS}.vpl_size"
 LEAST_FRAMES = 8
@@ -154,7 +159,7 @@ def _frames(renderer: Renderer, scene: Scene, lights: str, options: Options, pro
     while len(sums) < LEAST_FRAMES or (done < options.pairs and len(sums) < MOST_FRAMES):
         moved = replace(scene, camera=_turned(scene.at(0).camera, options.size, rng.random(2) - 0.5))
         renderer.draw(moved, plan, seed=options.seed * MOST_FRAMES + len(sums))
-        sums.append(judged(renderer, moved, plan.outputs[lights][0]).sums())
+        sums.append(judged(renderer, moved, lights).sums())
         done += int(sums[-1][0])
         if progress:
             progress(done, max(options.pairs, done))
@@ -177,7 +182,7 @@ def _turned(camera: Camera, size: tuple[int, int], pixels: Array) -> Camera:
 class Pairs:
     """n pairs of a frame that face each other, the pixel within the light's cone; arrays are float64.
 
-    light: its number in the buffer, int (n,). position, normal: the pixel's surface, (n, 3). shown: what the map says,
+    light: its number in its buffer, int (n,). position, normal: the pixel's surface, (n, 3). shown: what the map says,
     (n,) from 0 to 1. lit: what the ray says, bool (n,). irradiance: without shadow, its luminance, (n,).
     """
 
@@ -195,26 +200,22 @@ class Pairs:
         return np.array([len(lit), (shown & ~lit).sum(), (~shown & lit).sum(), self.irradiance.sum(), leaked, lost])
 
 
-def judged(renderer: Renderer, scene: Scene, source: str) -> Pairs:
-    """The pairs of the frame of `scene` drawn last that pass `source` made, and what rays say of them."""
+def judged(renderer: Renderer, scene: Scene, lights: str) -> Pairs:
+    """The pairs of the frame of `scene` drawn last with `lights` ("spotlight", "vpls"), and what rays say of them."""
+    source, records_of = SOURCES[lights]
     with renderer.gpu.ctx:
         pairs, facing = (renderer.executor.resource((source, port)).read()[::-1] for port in ("pairs", "facing"))
-        records = renderer.executor.resource(("vpl", "lights")).records
+        records = renderer.executor.resource(records_of).records
     counts = pairs[..., 2] > 0  # what faces away, or lies outside the cone, gets nothing
     number, shown, irradiance, depth = pairs[counts].astype(np.float64).T
     away = np.float32(NEAR * scene.geometry.scale) / depth
     position = np.asarray(scene.camera.position) + scene.camera.rays(renderer.size)[counts] * away[:, None]
     normal, light = facing[counts, :3].astype(np.float64), number.astype(int)
-    lit = ~_blocked(renderer.tracer(), position, normal, records[light])
+    target, tracer = records["position"][light].astype(np.float64), renderer.tracer()
+    if lights == "vpls":  # which lie on surfaces; the spotlight hangs free
+        target = tracer.lift(target, records["z_axis"][light].astype(np.float64))
+    lit = ~tracer.occluded(tracer.lift(position, normal), target)
     return Pairs(light, position, normal, shown, lit, irradiance)
-
-
-def _blocked(tracer: Tracer, position: Array, normal: Array, lights: np.ndarray) -> Bools:
-    """Whether anything lies between surface points (n, 3) with unit `normal` (n, 3) and the LIGHT records (n,)."""
-    target = lights["position"].astype(np.float64)
-    on_surface = lights["tile"] >= 0  # a VPL; the spotlight hangs free
-    target[on_surface] = tracer.lift(target[on_surface], lights["z_axis"][on_surface].astype(np.float64))
-    return tracer.occluded(tracer.lift(position, normal), target)
 
 
 def _row(renderer: Renderer, scene: Scene, options: Options, maps: _Maps, sums: Array) -> Row:

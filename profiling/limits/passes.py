@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
+from deferred_ir.gl.shaders import Program
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.passes.shadow_maps import ShadowMaps
-from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
+from deferred_ir.shadows.views import pack_views
 
 FOLDER = Path(__file__).parent
 
@@ -21,7 +23,9 @@ class LimitLighting(Pass):
 
     shader_folder = FOLDER
     inputs: ClassVar[Mapping[str, Input]] = {
-        "lights": Input("the spotlight, then the VPLs", format="light"),
+        "lights": Input("the direct lights", format="light"),
+        "vpls": Input("the VPLs", format="vpl"),
+        "views": Input("where the direct lights' maps are", format="view"),
         "depth": Input("reversed depth", format="depth32f"),
         "shadows": Input("shadow atlas", format="depth32f", linear=True, compare=">="),
     }
@@ -32,14 +36,17 @@ class LimitLighting(Pass):
         return {"radiance": Output("lights that reach the pixel; 0 on the background", Texture("rgba32f"))}
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """One fullscreen draw a block of lights."""
+        """One fullscreen draw a block of VPLs."""
         del frame
-        ctx, lights = io.gpu.ctx, io["lights"]
+        ctx, vpls = io.gpu.ctx, io["vpls"]
+        io["lights"].bind()
+        io["views"].bind()
         program = io.program("limit_lighting.frag")
         ctx.blend_func = ctx.ONE, ctx.ONE
-        for start in range(0, len(lights.records), LIGHTS_PER_BLOCK):
-            lights.bind_uniform(1, start // LIGHTS_PER_BLOCK)
-            program.set(first=int(start == 0), count=min(LIGHTS_PER_BLOCK, len(lights.records) - start))
+        for start in range(0, max(len(vpls.records), 1), VPLS_PER_BLOCK):
+            vpls.bind(start // VPLS_PER_BLOCK)
+            direct = len(io["lights"].records) if start == 0 else 0
+            program.set(direct=direct, count=min(VPLS_PER_BLOCK, len(vpls.records) - start))
             program.draw_fullscreen()
             ctx.enable(ctx.BLEND)
 
@@ -53,28 +60,38 @@ class LimitMaps(ShadowMaps):
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """The atlas with its layers laid out."""
-        atlas = super().outputs(inputs)["atlas"]
+        outputs = super().outputs(inputs)
+        atlas = outputs["atlas"]
         assert isinstance(atlas.description, Texture)
         assert atlas.description.size
         width, height = atlas.description.size
         plain = Texture("depth32f", size=(width, height * atlas.description.layers))
-        return {"atlas": Output("the atlas's layers above one another", plain, atlas.defines)}
+        doc = "the atlas's layers above one another"
+        return {"atlas": Output(doc, plain, atlas.defines), "views": outputs["views"]}
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Clear, then draw the scene for each light."""
-        lights, edge = io["lights"], io.framebuffer.size[0]
+        vpls, edge = io["vpls"], io.framebuffer.size[0]
         io.framebuffer.clear_depth()
         self.params.prepare(io.gpu)
-        program = io.program("shadow_maps/depth.frag", "shadow_maps/single.vert")
-        maps = self.subpasses({**dict.fromkeys(self.inputs), "lights": lights.description})[: len(lights.records)]
-        for i, place in enumerate(maps):
-            size, row = place["size"], edge // place["size"]
-            if i % LIGHTS_PER_BLOCK == 0:
-                lights.bind_uniform(1, i // LIGHTS_PER_BLOCK)
-            y, x = divmod(place["tile"], row)
-            io.gpu.gl.Viewport(x * size, place["layer"] * edge + y * size, size, size)
-            program.set(light_number=i % LIGHTS_PER_BLOCK)
-            frame.buffers.draw(program)
+        views = pack_views(frame, self.params, edge)
+        io["views"].write(views)
+        io["views"].bind()
+        spot, *tiles = self.subpasses({**dict.fromkeys(self.inputs), "vpls": vpls.description})
+        files = "shadow_maps/depth.frag", "shadow_maps/single.vert"
+        self._draw_map(frame, io, io.program(*files, defines={"DRAWS_VPLS": 0}), spot, 0)
+        program = io.program(*files, defines={"DRAWS_VPLS": 1})
+        for i, place in enumerate(tiles[: len(vpls.records)]):
+            if i % VPLS_PER_BLOCK == 0:
+                vpls.bind(i // VPLS_PER_BLOCK)
+            self._draw_map(frame, io, program, place, i % VPLS_PER_BLOCK)
+
+    def _draw_map(self, frame: Frame, io: Io, program: Program, place: Mapping[str, Any], number: int) -> None:
+        edge, size = io.framebuffer.size[0], place["size"]
+        y, x = divmod(place["tile"], edge // size)
+        io.gpu.gl.Viewport(x * size, place["layer"] * edge + y * size, size, size)
+        program.set(view_number=number)
+        frame.buffers.draw(program)
 
 
 LIMITS: Mapping[str, type[Pass]] = {"limit_lighting": LimitLighting, "limit_maps": LimitMaps}

@@ -161,7 +161,7 @@ def errors(scene: Scene) -> tuple[dict[str, Any], dict[str, Array]]:
     result: dict[str, Any] = {"penumbra": float(penumbra.mean()), "relmse": {}}
     images = {}
     for name, value in (("hard", "off"), ("soft", "pcss")):
-        radiance = render(scene, SIZE, set={"shadow_maps.soft": value}).radiance
+        radiance = render(scene, SIZE, set={"lighting.soft": value}).radiance
         result["relmse"][name] = {
             "penumbra": relmse(radiance, direct, penumbra)[0],
             "all": relmse(radiance, direct)[0],

@@ -1,6 +1,7 @@
 // Depth in a paraboloid map, near / distance, fragment by fragment: of a split triangle by its plane, exactly; of one
 // that is small in the map by the point between its corners; of one that is drawn straight, though it may be large, by the
 // plane that derivatives tell.
+#include "lib/shadows/drawn_view.glsl"
 #include "lib/shadows/projection.glsl"
 #include "lib/shadows/paraboloid_varyings.glsl"
 
@@ -8,8 +9,8 @@ in Part PART part;
 
 #if SPLIT || STRAIGHT
 // From the light, in its frame.
-vec3 seen_direction(Light light) {
-    vec2 p = part.ndc * light.curve * light.tan_half;
+vec3 seen_direction(View view) {
+    vec2 p = part.ndc * view.curve * view.tan_half;
     float square = dot(p, p);
     return vec3(2.0 * p, 1.0 - square) / (1.0 + square);
 }
@@ -17,10 +18,10 @@ vec3 seen_direction(Light light) {
 
 #if SPLIT
 void main() {
-    Light light = lights[part.light];
-    vec3 direction = seen_direction(light);
+    View view = drawn_view(part.view);
+    vec3 direction = seen_direction(view);
     float depth = max(dot(part.plane.xyz, direction), part.plane.w);
-    vec2 p = part.ndc * light.curve * light.tan_half;
+    vec2 p = part.ndc * view.curve * view.tan_half;
     vec3 inside = max(direction * part.edges, vec3(p, 1.0) * part.chords);
     bool outside = any(lessThan(inside, vec3(-part.gap)));
     // No near plane: where a wall beside the light stands on the light's own, that would cut off its foot.
@@ -29,10 +30,10 @@ void main() {
 }
 #elif STRAIGHT
 void main() {
-    Light light = lights[part.light];
-    vec3 direction = seen_direction(light);
-    vec2 across = vec2(dot(part.seen, light.x_axis), dot(part.seen, light.y_axis)) * light.tan_half;
-    vec3 to_point = vec3(across, dot(part.seen, light.z_axis));
+    View view = drawn_view(part.view);
+    vec3 direction = seen_direction(view);
+    vec2 across = vec2(dot(part.seen, view.x_axis), dot(part.seen, view.y_axis)) * view.tan_half;
+    vec3 to_point = vec3(across, dot(part.seen, view.z_axis));
     vec3 normal = cross(dFdx(to_point), dFdy(to_point));
     float inverse = inversesqrt(max(dot(to_point, to_point), TINY)), h = dot(normal, to_point) * inverse;
     float along = dot(normal, direction) * sign(h);

@@ -24,14 +24,14 @@ void main() {
             gl_ClipDistance[side] = gl_in[i].gl_ClipDistance[side];
 #if SPLIT
         part.ndc = corner[i].ndc;
-        part.light = corner[i].light;
+        part.view = corner[i].view;
         part.edges = corner[i].edges;
         part.chords = corner[i].chords;
         part.plane = corner[i].plane;
         part.gap = corner[i].gap;
 #elif STRAIGHT
         part.ndc = corner[i].ndc;
-        part.light = corner[i].light;
+        part.view = corner[i].view;
         part.seen = corner[i].seen;
 #else
         part.seen = corner[i].seen;

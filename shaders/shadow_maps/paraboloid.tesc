@@ -1,14 +1,15 @@
 // Cuts a triangle at the plane of a light, behind which nothing shows, and says how finely what is left has to be split to
 // be nearly straight in the light's paraboloid map. The outline moves out by as much as it may still bend (paraboloid.tese),
 // so that the parts cover all of the triangle; paraboloid.frag discards what they cover beyond it.
+#include "lib/shadows/drawn_view.glsl"
 #include "lib/shadows/projection.glsl"
 #include "lib/shadows/paraboloid_varyings.glsl"
 
 layout(vertices = 1) out;
 
-flat in int light_of_corner[];
+flat in int view_of_corner[];
 in vec3 corner[];
-patch out int light_of_patch;
+patch out int view_of_patch;
 patch out vec3 corners[4];  // unit, from the light to what is left of the triangle; the last two may be one
 patch out vec4 inwards[4];  // normals of the planes through the light and the edge to the next corner; angles of the edges
 patch out float turn;       // 1 if the corners go round their normals' way, else -1
@@ -51,8 +52,8 @@ vec3 cut(vec3 front, vec3 behind, float along_front, float along_behind) {
 // An edge is a piece of a great circle as the light sees it, with the normal `inward.xyz` and the angle `inward.w`, and of a
 // circle in the map: over an angle t it bends by t^2 / 8 of that circle's radius, the hemisphere's over dot(normal, z_axis).
 // All as angles in the middle of the map, where a texel is largest.
-float bend(Light light, vec4 inward) {
-    return inward.w * inward.w * abs(dot(inward.xyz, light.z_axis)) / 4.0;
+float bend(View view, vec4 inward) {
+    return inward.w * inward.w * abs(dot(inward.xyz, view.z_axis)) / 4.0;
 }
 
 // Square of the angle, nearly, of the longest side that is straight in the map, as all are of triangles that are drawn
@@ -81,11 +82,11 @@ vec3 line(vec3 start, vec3 end) {
 }
 
 void main() {
-    Light light = lights[light_of_corner[0]];
-    light_of_patch = light_of_corner[0];
+    View view = drawn_view(view_of_corner[0]);
+    view_of_patch = view_of_corner[0];
     vec3 a = corner[0], b = corner[1], c = corner[2];
     vec3 sizes = vec3(length(a), length(b), length(c));
-    vec3 along = vec3(dot(a, light.z_axis), dot(b, light.z_axis), dot(c, light.z_axis));
+    vec3 along = vec3(dot(a, view.z_axis), dot(b, view.z_axis), dot(c, view.z_axis));
     vec3 normal = cross(b - a, c - a);
     float h = dot(normal, a);
     bool seen_edge_on = abs(h) <= ROUNDING * frame.near * length(normal);
@@ -94,9 +95,9 @@ void main() {
         gl_TessLevelOuter[0] = gl_TessLevelOuter[1] = gl_TessLevelOuter[2] = gl_TessLevelOuter[3] = 0.0;
         return;
     }
-    mat3 to_frame = transpose(mat3(light.x_axis * light.tan_half, light.y_axis * light.tan_half, light.z_axis));
+    mat3 to_frame = transpose(mat3(view.x_axis * view.tan_half, view.y_axis * view.tan_half, view.z_axis));
     turn = h < 0.0 ? -1.0 : 1.0;
-    float texel = texel_angle(light), longest = 0.0;
+    float texel = texel_angle(view), longest = 0.0;
     vec3 depths = normal / h, triangle[3] = vec3[3](a, b, c), units[3] = vec3[3](unit(a), unit(b), unit(c));
     float longest_straight = straight_side(texel);
     for (int i = 0; i < 3; ++i) {
@@ -145,8 +146,8 @@ void main() {
         int next = (i + 1) % 4;
         vec3 inward = inwards[i].xyz, way = left[next] - left[i];
         bool sharp = is_sharp(inwards[(i + 3) % 4].xyz, inward) || is_sharp(inward, inwards[next].xyz);
-        float most = bend(light, inwards[i]), count = 1.0;
-        if (dot(inward, light.z_axis) < 0.0 && dot(way, way) <= longest_straight) {
+        float most = bend(view, inwards[i]), count = 1.0;
+        if (dot(inward, view.z_axis) < 0.0 && dot(way, way) <= longest_straight) {
             if (is_cut) margin = max(margin, most);
         } else {
             // Beside a sharp corner, which moves less than the margin, the outline has to be the farther off.

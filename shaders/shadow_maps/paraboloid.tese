@@ -6,7 +6,7 @@
 
 layout(quads, equal_spacing, ccw) in;
 
-patch in int light_of_patch;
+patch in int view_of_patch;
 patch in vec3 corners[4];
 patch in vec4 inwards[4];
 patch in float turn;
@@ -37,10 +37,10 @@ void main() {
     else if (side_v) direction = v == 0.0 ? on_edge(0, u) : on_edge(2, 1.0 - u);
     else if (side_u) direction = u == 0.0 ? on_edge(3, 1.0 - v) : on_edge(1, v);
     else direction = corners[0] + corners[1] + corners[2] + corners[3];
-    part.light = light_of_patch;
+    part.view = view_of_patch;
     part.edges = edges;
     part.chords = chords;
     part.plane = plane;
     part.gap = gap;
-    part.ndc = place(lights[light_of_patch], direction);
+    part.ndc = place(drawn_view(view_of_patch), direction);
 }

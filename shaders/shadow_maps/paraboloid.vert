@@ -1,31 +1,30 @@
-// The scene as a light's paraboloid map sees it: triangles that are small in the map go there as they are, others to
-// paraboloid.tesc.
+// The scene in a paraboloid map: triangles that are small in the map go there as they are, others to paraboloid.tesc.
 #if LAYER_FROM_VERTEX && !SPLIT
 #extension GL_ARB_shader_viewport_layer_array : require
 #endif
-#include "lib/shadows/projection.glsl"
+#include "lib/shadows/drawn_view.glsl"
 #if SPLIT
-flat out int light_of_corner;
-out vec3 corner;  // from the light
+flat out int view_of_corner;
+out vec3 corner;  // from the view
 #else
 #include "lib/shadows/paraboloid.glsl"
 #endif
 
-in int light_index;  // in its block; one an instance
+in int view_index;  // in its block; one an instance
 in vec3 position;
 
 void main() {
-    Light light = lights[light_index];
-    vec3 d = position - map_origin(light);
+    View view = drawn_view(view_index);
+    vec3 d = position - view.position;
 #if SPLIT
-    light_of_corner = light_index;
+    view_of_corner = view_index;
     corner = d;
 #else
     part.seen = d;
-    vec2 map_ndc = place(light, d);
+    vec2 map_ndc = place(view, d);
 #if STRAIGHT
     part.ndc = map_ndc;
-    part.light = light_index;
+    part.view = view_index;
 #endif
 #endif
 }

@@ -1,9 +1,10 @@
-// The scene as one light sees it, into a plain depth map of its own.
+// The scene as one view sees it, into a plain depth map of its own.
+#include "lib/shadows/drawn_view.glsl"
 #include "lib/shadows/projection.glsl"
 
-uniform int light_number;  // in this block
+uniform int view_number;  // in this block
 in vec3 position;
 
 void main() {
-    gl_Position = planar_clip(lights[light_number], position);
+    gl_Position = planar_clip(drawn_view(view_number), position);
 }

@@ -162,7 +162,7 @@ def test_pixels_that_are_not_made_of_radiance_are_refused(tmp_path, renderer):
     file = tmp_path / "two.toml"
     file.write_text(
         'extends = "deferred"\n[outputs]\nradiance = "second.radiance"\n[passes.second]\ntype = "lighting"\n'
-        'inputs = { lights = "vpl.lights", depth = "gbuffer.depth", normals = "gbuffer.normals",'
+        'inputs = { lights = "lights.lights", vpls = "vpl.vpls", depth = "gbuffer.depth", normals = "gbuffer.normals",'
         ' albedo = "gbuffer.albedo" }\n'
     )
     one = renderer(SIZE, file)

@@ -159,7 +159,7 @@ def test_the_atlas_has_room_for_the_lights_that_live(renderer, monkeypatch):
     half = replace(gable(), spotlight=replace(gable().spotlight, position=(0.1, 1.6, 1.0), look_at=(0.1, -1.0, 1.0)))
     one = renderer(SIZE, set=settings)
     image = one.render(half, vpls=256)
-    lights = one.executor.resource(("vpl", "lights")).records
+    lights = one.executor.resource(("vpl", "vpls")).records
     tiles = lights["tile"][lights["emission"].any(axis=1)].max() + 1
     assert 16 < tiles < 200
     assert atlas(one).layers == 1 + -(-tiles // 16) < 17

@@ -86,12 +86,12 @@ def test_resources_survive_a_plan_that_still_has_them(renderer):
     one = renderer(SIZE)
     one.render(room(), vpls=4)
     albedo, atlas, lights = (
-        one.executor.resource(s) for s in (("gbuffer", "albedo"), ("shadow_maps", "atlas"), ("vpl", "lights"))
+        one.executor.resource(s) for s in (("gbuffer", "albedo"), ("shadow_maps", "atlas"), ("vpl", "vpls"))
     )
     one.render(room(), vpls=5)
     assert one.executor.resource(("gbuffer", "albedo")) is albedo
     assert one.executor.resource(("shadow_maps", "atlas")) is atlas  # still one layer of tiles
-    assert one.executor.resource(("vpl", "lights")) is not lights  # room for another
+    assert one.executor.resource(("vpl", "vpls")) is not lights  # room for another
 
 
 def test_programs_are_built_once(renderer):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -68,7 +69,7 @@ def test_a_still_frame_runs_nothing(renderer, graph):
     ("graph", "scene", "options", "ran"),
     [
         ("deferred", CAMERA, {}, {"gbuffer", "lighting", "tonemap"}),
-        ("deferred", LIGHT, {}, {"vpl", "shadow_maps", "lighting", "tonemap"}),
+        ("deferred", LIGHT, {}, {"lights", "vpl", "shadow_maps", "lighting", "tonemap"}),
         ("deferred", ROOM, {"seed": 1}, {"vpl", "shadow_maps", "lighting", "tonemap"}),
         ("deferred", ROOM, {"time": 1.0}, set()),
         ("forward", CAMERA, {}, {"visible_faces", "forward", "tonemap"}),
@@ -98,6 +99,21 @@ def test_a_changed_setting_runs_its_pass_and_its_readers(renderer):
     one.configure(set={**SETTINGS, "tonemap.exposure": 1.0})
     assert "tonemap" in drawn(one, ROOM)
     assert not drawn(one, ROOM)
+
+
+@pytest.mark.parametrize("key", ["spot_kernel", "vpl_kernel", "spot_taps", "vpl_offset", "soft_taps"])
+def test_another_filter_lights_again_and_draws_no_map(renderer, key):
+    """Nor does it compile a program that does not name it."""
+    settings = {**SETTINGS, "lighting.spot_kernel": 3.0, "lighting.vpl_kernel": 3.0}
+    one = settled(renderer(SIZE, set=settings, reuse=True))
+    library = one.executor.library
+    before = set(library._programs.values())
+    one.configure(set={**settings, f"lighting.{key}": 5})
+    assert drawn(one, ROOM) == {"lighting", "tonemap"}
+    assert one.executor.counters["maps_drawn"] == 0
+    new = set(library._programs.values()) - before
+    assert len(new) == 1
+    assert all(re.search(rf"#define {key.upper()} 5", program.text) for program in new)
 
 
 def test_a_light_that_moves_uploads_no_vertices(renderer, monkeypatch):
@@ -150,8 +166,9 @@ def test_each_change_costs_what_it_must(renderer, monkeypatch):
     work, exposed = Work(one, monkeypatch), {**SETTINGS, "tonemap.exposure": 1.0}
     work.of(ROOM, exposed)  # the curve of this exposure is another program, once
     work.of(CAMERA, exposed)
-    # Uploads: the frame's uniforms always; for lighting the lists of tiles; of lights they, and what maps' draws read.
-    for scene, expected in ((CAMERA, (3, 2)), (LIGHT, (3, 5)), (BRIGHTER, (2, 3))):
+    # Uploads: the frame's uniforms always; for lighting the lists of tiles; lights, VPLs and views if they changed, and
+    # what the draws of the maps of VPLs and of views read.
+    for scene, expected in ((CAMERA, (3, 2)), (LIGHT, (4, 9)), (BRIGHTER, (2, 4))):
         work.of(ROOM, exposed)
         assert work.of(ROOM, exposed) == (0, 1, {})
         assert work.of(scene, exposed) == (*expected, {})
@@ -240,13 +257,13 @@ def test_a_frame_that_is_broken_off_runs_again(renderer, monkeypatch):
         broken.setattr(GpuBuffer, "write", lambda *_: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             drawn(one, LIGHT)
-    assert "vpl" in drawn(one, ROOM)
+    assert "lights" in drawn(one, ROOM)
 
 
 def test_lights_that_were_not_uploaded_light_the_next_frame(renderer, monkeypatch):
     one = settled(renderer(SIZE, set=SETTINGS, reuse=True))
     with monkeypatch.context() as broken:
-        broken.setattr(one.executor.resource(("vpl", "lights")), "buffer", Broken())
+        broken.setattr(one.executor.resource(("vpl", "vpls")), "buffer", Broken())
         with pytest.raises(ZeroDivisionError):
             one.render(BRIGHTER)
     expected = renderer(SIZE, set=SETTINGS).render(BRIGHTER)

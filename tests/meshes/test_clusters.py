@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fixed_lights import lit_by, spot_record, vpl_records
+from fixed_lights import lit_by, vpl_records
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_scenes import Mesh, build, crooked_room, room, triangle_soup
 
+from deferred_ir.frame.vpl_buffer import VPL, VPLS_PER_BLOCK
 from deferred_ir.loading.load import load
 from deferred_ir.meshes.clusters import Clusters
 from deferred_ir.meshes.posed import MapMesh
-from deferred_ir.scene.lights.spot import LIGHT, LIGHTS_PER_BLOCK, light_records
 from deferred_ir.shadows import mesh_choice
 
 SETTINGS = {"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}
@@ -121,7 +121,7 @@ def test_what_a_light_cannot_see_is_left_out(hemisphere):
 def test_no_lights_see_no_clusters():
     mesh = triangle_soup(1)
     clusters = Clusters(mesh.positions, mesh.faces, most=8)
-    assert clusters.find_visible(np.zeros(0, LIGHT)).shape == (0, len(clusters))
+    assert clusters.find_visible(np.zeros(0, VPL)).shape == (0, len(clusters))
 
 
 # On the device
@@ -131,7 +131,7 @@ class Atlases:
     """Draws the same lights with clusters of a chosen size; WHOLE: every light draws all triangles."""
 
     def __init__(self, make, folder, monkeypatch, count: int, settings=SETTINGS) -> None:
-        self.records = np.zeros(count, LIGHT)
+        self.records = np.zeros(count, VPL)
         self.one = lit_by(make, folder, self.records, (32, 32), "deferred", set=settings)
         self.patch = monkeypatch
 
@@ -150,7 +150,7 @@ def atlases(renderer, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("layer_from_vertex", [True, False])
 def test_any_scene_has_the_same_maps(atlases, layer_from_vertex):
-    draw = atlases(9)
+    draw = atlases(8)
     if not layer_from_vertex:
         draw.one.gpu.layer_from_vertex = False
 
@@ -164,8 +164,7 @@ def test_any_scene_has_the_same_maps(atlases, layer_from_vertex):
     def same(seed, fov, scale, most):
         mesh = triangle_soup(seed, scale=scale)
         scene = build(mesh)
-        draw.records[:1] = spot_record(scene)
-        draw.records[1:] = lights_among(mesh, seed, fov=fov)
+        draw.records[:] = lights_among(mesh, seed, fov=fov)
         np.testing.assert_array_equal(draw(scene, most), draw(scene, WHOLE))
 
     same()
@@ -173,24 +172,22 @@ def test_any_scene_has_the_same_maps(atlases, layer_from_vertex):
 
 def test_the_atrium_has_the_same_maps(atlases):
     scene = load("atrium")
-    draw = atlases(17)
+    draw = atlases(16)
     rng = np.random.default_rng(5)
     faces = rng.integers(len(scene.geometry.faces), size=16)
     position = scene.geometry.positions[scene.geometry.faces[faces, 0]]
-    draw.records[:1] = spot_record(scene)
-    draw.records[1:] = vpl_records(position, scene.geometry.face_normals[faces], np.ones((16, 3)))
+    draw.records[:] = vpl_records(position, scene.geometry.face_normals[faces], np.ones((16, 3)))
     full = draw(scene, WHOLE)
     np.testing.assert_array_equal(draw(scene, 256), full)
     assert (full > 0).mean() > 0.05
 
 
 def test_lights_of_every_block_have_the_same_maps(atlases):
-    count = LIGHTS_PER_BLOCK + 9
+    count = VPLS_PER_BLOCK + 9
     draw = atlases(count, settings={"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 16})
     mesh = triangle_soup(8, 64)
     scene = build(mesh)
-    draw.records[:1] = spot_record(scene)
-    draw.records[1:] = lights_among(mesh, 8, count - 1)
+    draw.records[:] = lights_among(mesh, 8, count)
     np.testing.assert_array_equal(draw(scene, 8), draw(scene, WHOLE))
 
 
@@ -198,10 +195,10 @@ def test_a_light_that_sees_nothing_leaves_its_map_clear(atlases):
     """All lights look out of the room from its corners; nothing is drawn at all."""
     draw = atlases(3)
     away = np.array([[2.0, 2.0, 2.0]]).repeat(3, axis=0)
-    draw.records[:] = light_records(away, away / np.sqrt(12), np.ones((3, 3)), fov=60.0, tile=np.array([-1.0, 0, 1]))
-    assert draw(room(), 4).max() == 0
+    draw.records[:] = vpl_records(away, away, np.ones((3, 3)), fov=60.0)
+    assert draw(room(), 4)[1:].max() == 0
     draw.records["z_axis"] *= -1
-    assert draw(room(), 4).max() > 0
+    assert draw(room(), 4)[1:].max() > 0
 
 
 def test_memory_counts_clusters_once_they_are_made(renderer):
@@ -238,7 +235,7 @@ def test_maps_of_vpls_alone_draw_a_stand_in(renderer, monkeypatch, graph, projec
     one = renderer((48, 48), graph, set={"shadow_maps.projection": projection})
     whole, direct = (one.render(scene, vpls=vpls).radiance for vpls in (16, 0))
     before = one._buffers.buffer_bytes
-    monkeypatch.setattr(mesh_choice, "of_vpls", other)
+    monkeypatch.setattr(mesh_choice, "choose_mesh", other)
     half = [one.render(scene, vpls=16).radiance for _ in range(2)]
     assert half[0].mean() > 1.002 * whole.mean()
     np.testing.assert_array_equal(*half)

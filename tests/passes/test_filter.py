@@ -7,7 +7,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from fixed_lights import lit_by, spot_record, vpl_records
+from fixed_lights import lit_by, vpl_records
 from small_scenes import build, plane, quad, room, scaled
 
 from deferred_ir.scene.camera import Camera
@@ -26,7 +26,7 @@ def shown(make, scene, lights, *, size=SIZE, seed=0, **settings):
     one = make(size, visibility.GRAPH, set=given, passes=visibility.PASSES)
     plan = one.plan(scene, outputs=[lights])
     one.draw(scene, plan, seed=seed)
-    pairs = visibility.judged(one, scene, plan.outputs[lights][0])
+    pairs = visibility.judged(one, scene, lights)
     return pairs.shown, pairs.lit
 
 
@@ -82,8 +82,8 @@ def test_a_wide_filter_reads_no_tile_but_its_own(renderer, tmp_path, projection)
     images = []
     for places, powers in (([covered] * 4 + [free] + [covered] * 4, [0] * 4 + [1] + [0] * 4), ([free], [1])):
         lights = vpl_records(places, [(0, -1, 0)] * len(places), np.multiply.outer(powers, np.ones(3)))
-        records = np.concatenate([spot_record(scene, DARK), lights])
-        images.append(lit_by(renderer, tmp_path, records, SIZE, "deferred", set=settings).render(scene).radiance)
+        one = lit_by(renderer, tmp_path, lights, SIZE, "deferred", set=settings, dark=True)
+        images.append(one.render(scene).radiance)
     assert images[0].max() > 0
     np.testing.assert_allclose(*images, rtol=1e-6)
 

@@ -12,7 +12,7 @@ from small_scenes import build, plane, room
 
 from deferred_ir.base.errors import GraphError
 from deferred_ir.cli import main
-from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
+from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 
 SIZE = (48, 32)
 ROOM = room()
@@ -47,7 +47,7 @@ def test_kept_maps_hold_what_maps_drawn_anew_hold(renderer, projection, layer_fr
 
 
 def test_tiles_of_every_block_of_lights_are_kept(renderer):
-    count = LIGHTS_PER_BLOCK + 40
+    count = VPLS_PER_BLOCK + 40
     settings = {"vpl.count": count, "vpl.most": count, "shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 16}
     one = renderer(SIZE, "incremental", set=settings)
     plan = one.plan(ROOM)
@@ -56,10 +56,10 @@ def test_tiles_of_every_block_of_lights_are_kept(renderer):
     first = read_vpl_maps(one, 16)
     one.draw(moved(ROOM, 1), plan)
     assert one.executor.counters["maps_drawn"] < count
-    lights = one.executor.resource(("vpl", "lights"))
+    vpls = one.executor.resource(("vpl", "vpls"))
     same = [tile for tile in read_vpl_maps(one, 16) if (first.get(tile) == read_vpl_maps(one, 16)[tile]).all()]
     assert len(same) > count // 2
-    assert len(np.unique(lights.records["tile"])) == len(lights.records)
+    assert len(np.unique(vpls.records["tile"])) == len(vpls.records)
 
 
 def test_a_still_light_draws_nothing_and_shows_the_same(renderer):

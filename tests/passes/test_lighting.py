@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixed_lights import lit_by, spot_record, vpl_records
+from fixed_lights import lit_by, vpl_records
 from small_scenes import build, plane, quad, sphere
 
 from deferred_ir.rays.tracer import Tracer
@@ -91,10 +91,8 @@ def test_a_very_narrow_spotlight_keeps_its_soft_edge(renderer):
 def test_a_vpl_on_a_floor(renderer, tmp_path, graph, fov, clamp):
     scene = floor()
     position, normal, emission = np.array([0.2, 0.7, 0.1]), np.array([0.1, -1.0, 0.3]), np.array([0.5, 1.0, 2.0])
-    records = np.concatenate(
-        [spot_record(scene, DARK), vpl_records([position], [normal], [emission], fov=fov, clamp=clamp)]
-    )
-    radiance = lit_by(renderer, tmp_path, records, SIZE, graph).render(scene).radiance
+    records = vpl_records([position], [normal], [emission], fov=fov, clamp=clamp)
+    radiance = lit_by(renderer, tmp_path, records, SIZE, graph, dark=True).render(scene).radiance
     positions, shown = seen(scene)
     way = positions - position
     square = (way**2).sum(axis=-1)
@@ -113,28 +111,28 @@ def test_a_vpl_on_a_floor(renderer, tmp_path, graph, fov, clamp):
 
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_the_clamp_spares_the_spotlight(renderer, tmp_path, graph):
-    scene = floor()
-    record = spot_record(scene)
-    record["clamp_squared"] = 100.0
-    clamped = lit_by(renderer, tmp_path, record, SIZE, graph).render(scene).radiance
+    scene, dark = floor(), vpl_records([(0, 1, 0)], [(0, -1, 0)], [DARK], clamp=10.0)
+    clamped = lit_by(renderer, tmp_path, dark, SIZE, graph).render(scene).radiance
     np.testing.assert_array_equal(clamped, renderer(SIZE, graph).render(scene, vpls=0).radiance)
 
 
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_light_from_behind_a_face_does_not_shine_through(renderer, tmp_path, graph):
     scene = floor()
-    records = np.concatenate([spot_record(scene, DARK), vpl_records([(0, -0.5, 0)], [(0, 1, 0)], [(1, 1, 1)])])
-    assert lit_by(renderer, tmp_path, records, SIZE, graph).render(scene).radiance.max() == 0
+    records = vpl_records([(0, -0.5, 0)], [(0, 1, 0)], [(1, 1, 1)])
+    assert lit_by(renderer, tmp_path, records, SIZE, graph, dark=True).render(scene).radiance.max() == 0
 
 
 UNSHADOWED = {
     "deferred": """
 [outputs]
 radiance = "lighting.radiance"
+[passes.lights]
 [passes.vpl]
 [passes.gbuffer]
 [passes.lighting.inputs]
-lights = "vpl.lights"
+lights = "lights.lights"
+vpls = "vpl.vpls"
 depth = "gbuffer.depth"
 normals = "gbuffer.normals"
 albedo = "gbuffer.albedo"
@@ -142,10 +140,12 @@ albedo = "gbuffer.albedo"
     "forward": """
 [outputs]
 radiance = "forward.radiance"
+[passes.lights]
 [passes.vpl]
 [passes.visible_faces]
 [passes.forward.inputs]
-lights = "vpl.lights"
+lights = "lights.lights"
+vpls = "vpl.vpls"
 primitives = "visible_faces.primitives"
 depth = "visible_faces.depth"
 """,
@@ -227,8 +227,7 @@ def test_an_occluder_shades_a_vpl_where_it_should_in_any_tile(renderer, tmp_path
     emission[tile] = 1.0
     lights = vpl_records(np.tile((0.0, 1.5, 0.0), (20, 1)), np.tile((0.0, -1, 0), (20, 1)), emission, fov=120.0)
     lights["position"][np.arange(20) != tile] += (0.3, 0.2, -0.1)
-    records = np.concatenate([spot_record(scene, DARK), lights])
-    one = lit_by(renderer, tmp_path, records, SIZE, graph)
+    one = lit_by(renderer, tmp_path, lights, SIZE, graph, dark=True)
     texel = 2 * 1.5 * np.tan(np.radians(60)) / 256
     check_shadow(scene, one.render(scene).radiance, one.render(bare).radiance, texel)
 
@@ -252,7 +251,7 @@ def test_a_light_on_a_surface_and_a_camera_on_the_light_give_finite_numbers(rend
     spot = Spotlight((0.3, 0.0, 0.0), (0.3, -1.0, 0.0), 120.0, (1.0, 1.0, 1.0))
     lights = vpl_records([(0.0, 0.0, 0.0), scene.camera.position], [(0, 1, 0), (0, -1, 0)], [(1, 1, 1)] * 2)
     there = replace(scene, spotlight=spot)
-    image = lit_by(renderer, tmp_path, np.concatenate([spot_record(there), lights]), SIZE, graph).render(there)
+    image = lit_by(renderer, tmp_path, lights, SIZE, graph).render(there)
     assert np.isfinite(image.radiance).all()
 
 
@@ -260,7 +259,7 @@ def test_a_light_on_a_surface_and_a_camera_on_the_light_give_finite_numbers(rend
 def test_a_light_exactly_where_a_pixel_looks_gives_nothing_instead_of_a_division_by_zero(renderer, tmp_path, graph):
     scene = build(plane(), camera=Camera((0.0, 2.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)))
     scene = replace(scene, spotlight=Spotlight((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), 120.0, (1.0, 1.0, 1.0)))
-    records = np.concatenate([spot_record(scene), vpl_records([(0, 0, 0)], [(0, 1, 0)], [(1, 1, 1)])])
+    records = vpl_records([(0, 0, 0)], [(0, 1, 0)], [(1, 1, 1)])
     for size in ((1, 1), (3, 3)):
         image = lit_by(renderer, tmp_path, records, size, graph).render(scene)
         assert (image.radiance == 0).all()
@@ -275,11 +274,10 @@ def test_inside_a_sphere_one_vpl_lights_every_point_alike(renderer, tmp_path, gr
         camera=Camera((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), 90.0),
         spotlight=Spotlight((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), 60.0),
     )
-    vpl = vpl_records([(0.0, -radius, 0.0)], [(0.0, 1.0, 0.0)], [(4.0, 2.0, 1.0)])
-    lights = np.concatenate([spot_record(scene, DARK), vpl])
+    lights = vpl_records([(0.0, -radius, 0.0)], [(0.0, 1.0, 0.0)], [(4.0, 2.0, 1.0)])
     # Nothing is hidden in a sphere; well off their faces, no points are shaded by the maps' texels either.
     free = {"shadow_maps.vpl_offset": 3.0}
-    radiance = lit_by(renderer, tmp_path, lights, SIZE, graph, set=free).render(scene).radiance
+    radiance = lit_by(renderer, tmp_path, lights, SIZE, graph, set=free, dark=True).render(scene).radiance
     expected = np.array(ALBEDO) / np.pi * (4.0, 2.0, 1.0) / (4 * radius**2)
     # The facets stand up to 1e-3 inside the sphere.
     np.testing.assert_allclose(radiance, np.broadcast_to(expected, radiance.shape), rtol=5e-3)

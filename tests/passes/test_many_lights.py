@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from distance import assert_same_but_for_edges
-from fixed_lights import lit_by, spot_record, vpl_records
+from fixed_lights import lit_by, vpl_records
 from small_scenes import room, scaled
 
-from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
+from deferred_ir.frame.vpl_buffer import VPL, VPLS_PER_BLOCK
 
 SIZE = (96, 72)
 GRAPHS = ("deferred", "forward")
@@ -35,7 +35,7 @@ def test_the_order_of_lights_does_not_matter(renderer, tmp_path, graph):
     retiled = shuffled.copy()
     retiled["tile"] = np.arange(70)
     images = [
-        lit_by(renderer, tmp_path, np.concatenate([spot_record(scene), records]), SIZE, graph).render(scene).radiance
+        lit_by(renderer, tmp_path, records, SIZE, graph).render(scene).radiance
         for records in (lights, shuffled, retiled)
     ]
     if graph == "deferred":  # a light that keeps its tile keeps its map; forward has no tiles
@@ -46,23 +46,22 @@ def test_the_order_of_lights_does_not_matter(renderer, tmp_path, graph):
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_more_lights_than_a_block_are_the_sum_of_their_parts(renderer, tmp_path, graph):
     scene, lights = room(), many(300)
-    assert LIGHTS_PER_BLOCK < 300
+    assert VPLS_PER_BLOCK < 300
 
     def image(records):
         records = records.copy()
         records["tile"] = np.arange(len(records))
-        whole = np.concatenate([spot_record(scene, DARK), records])
-        return lit_by(renderer, tmp_path, whole, SIZE, graph, set={"shadow_maps.vpl_size": 64}).render(scene).radiance
+        settings = {"shadow_maps.vpl_size": 64}
+        return lit_by(renderer, tmp_path, records, SIZE, graph, set=settings, dark=True).render(scene).radiance
 
     parts = sum(image(lights[start : start + 100]).astype(float) for start in (0, 100, 200))
     assert_same_but_for_edges(image(lights), parts)
 
 
 def test_lights_beyond_the_first_block_agree_with_forward(renderer, tmp_path):
-    scene, lights = room(), many(300)
-    records = np.concatenate([spot_record(scene, DARK), lights])
-    records["emission"][: LIGHTS_PER_BLOCK + 1] = 0
-    a, b = (lit_by(renderer, tmp_path, records, SIZE, graph).render(scene).radiance for graph in GRAPHS)
+    scene, records = room(), many(300)
+    records["emission"][:VPLS_PER_BLOCK] = 0
+    a, b = (lit_by(renderer, tmp_path, records, SIZE, graph, dark=True).render(scene).radiance for graph in GRAPHS)
     assert_same_but_for_edges(a, b)
 
 
@@ -96,7 +95,7 @@ def test_units_of_length_do_not_matter(renderer, factor):
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_no_vpls_is_the_spotlight_alone(renderer, tmp_path, graph):
     scene = room()
-    alone = lit_by(renderer, tmp_path, spot_record(scene), SIZE, graph).render(scene).radiance
+    alone = lit_by(renderer, tmp_path, np.zeros(0, VPL), SIZE, graph).render(scene).radiance
     np.testing.assert_array_equal(renderer(SIZE, graph).render(scene, vpls=0).radiance, alone)
 
 

@@ -6,16 +6,15 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from fixed_lights import lit_by, spot_record, vpl_records
+from fixed_lights import lit_by, vpl_records
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from map_rays import tiles, wrong_texels
 from small_scenes import build, triangle_soup
 
-from deferred_ir.frame.light_buffer import off_surface
+from deferred_ir.frame.vpl_buffer import VPL, off_surface
 from deferred_ir.loading.load import builtin_scenes, load
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.scene.lights.spot import LIGHT
 
 LIGHTS = 6
 ONES = np.ones((LIGHTS, 3))
@@ -47,18 +46,17 @@ def anywhere(scene, rng, fov, on_faces):
 @pytest.fixture(params=["perspective", "paraboloid"])
 def wrong(request, renderer, tmp_path):
     """Shares of wrong texels of LIGHTS lights chosen by a seed."""
-    projection, records = request.param, np.zeros(LIGHTS + 1, LIGHT)
+    projection, records = request.param, np.zeros(LIGHTS, VPL)
     settings = {"shadow_maps.projection": projection, "shadow_maps.vpl_size": SIZE, "shadow_maps.spot_size": 256}
     one = lit_by(renderer, tmp_path, records, (16, 16), "deferred", set=settings)
 
     def share(name, seed, fov, on_faces):
         scene, tracer = traced(name)
-        records[:1] = spot_record(scene)
-        records[1:] = anywhere(scene, np.random.default_rng(seed), fov, on_faces)
+        records[:] = anywhere(scene, np.random.default_rng(seed), fov, on_faces)
         one.render(scene)
         off = [
             wrong_texels(tracer, record, tile, projection)
-            for record, tile in zip(records[1:], tiles(one, LIGHTS), strict=True)
+            for record, tile in zip(records, tiles(one, LIGHTS), strict=True)
         ]
         return np.array(off).mean(axis=(1, 2))
 

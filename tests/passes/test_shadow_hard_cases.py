@@ -7,7 +7,7 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from fixed_lights import lit_by, spot_record, vpl_records
+from fixed_lights import lit_by, vpl_records
 from map_rays import tiles, wrong_texels
 from small_scenes import Mesh, box, build, plane, quad, room, scaled
 
@@ -34,9 +34,8 @@ def maps(renderer, tmp_path, projection):
 
     def draw(scene, position, normal, fov=150.0, **settings):
         lights = vpl_records(position, normal, np.ones((len(position), 3)), fov=fov)
-        records = np.concatenate([spot_record(scene), lights])
         chosen = {**SMALL, "shadow_maps.projection": projection, **settings}
-        one = lit_by(renderer, tmp_path, records, (16, 16), "deferred", set=chosen)
+        one = lit_by(renderer, tmp_path, lights, (16, 16), "deferred", set=chosen)
         one.render(scene)
         return tiles(one, len(lights)), lights
 
@@ -52,7 +51,7 @@ def judged(renderer, projection):
         one = renderer(SIZE, visibility.GRAPH, set=chosen, passes=visibility.PASSES)
         plan = one.plan(scene, outputs=[lights])
         one.draw(scene, plan, seed=1)
-        pairs = visibility.judged(one, scene, plan.outputs[lights][0])
+        pairs = visibility.judged(one, scene, lights)
         assert len(pairs.light) > 300
         assert np.isfinite(pairs.shown).all()
         return pairs

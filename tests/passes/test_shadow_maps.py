@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fixed_lights import lit_by, spot_record, vpl_records
+from fixed_lights import lit_by, vpl_records
 from small_scenes import build, plane, quad, room
 
 from deferred_ir.base.errors import DeviceError, GraphError
 from deferred_ir.frame.frame import NEAR
+from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 from deferred_ir.gl import raw
-from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 
 SIZE = (32, 32)
 SETTINGS = {"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}
@@ -36,7 +36,7 @@ def plain_of(make, folder, scene, records, settings=SETTINGS):
     one = lit_by(make, folder, records, SIZE, "forward", set=settings)
     one.render(scene)
     with one.gpu.ctx:
-        spot, vpls = (one.executor.resource(("shadow_maps", port)) for port in ("spot", "vpls"))
+        spot, vpls = (one.executor.resource(("shadow_maps", port)) for port in ("light_maps", "vpl_maps"))
         return spot[0].read()[..., 0], [texture.read()[..., 0] for texture in vpls]
 
 
@@ -55,7 +55,7 @@ def same_depths(a, b):
 
 @pytest.mark.parametrize("layer_from_vertex", [True, False])
 def test_each_tile_holds_what_a_map_of_its_own_holds(renderer, tmp_path, layer_from_vertex):
-    records = np.concatenate([spot_record(room()), inward(40)])
+    records = inward(40)
     if layer_from_vertex:
         atlas = atlas_of(renderer, tmp_path, room(), records)
     else:
@@ -74,7 +74,7 @@ def test_a_light_draws_into_its_tile_only(renderer, tmp_path, layer_from_vertex)
     """Lights in a few tiles of a large atlas; all that lies between stays clear, to the last texel."""
     lights = inward(40)
     used = [0, 5, 15, 16, 39]
-    records = np.concatenate([spot_record(room()), lights[used]])
+    records = lights[used]
     padded = np.concatenate([records, records[-1:].repeat(40 - len(used))])  # room for 40, all in tile 39
     options = {} if layer_from_vertex else {"layer_from_vertex": False}
     atlas = atlas_of(renderer, tmp_path, room(), padded, **options)
@@ -85,7 +85,7 @@ def test_a_light_draws_into_its_tile_only(renderer, tmp_path, layer_from_vertex)
 
 def test_sizes_that_do_not_divide_one_another(renderer, tmp_path):
     settings = {"shadow_maps.spot_size": 100, "shadow_maps.vpl_size": 48}
-    records = np.concatenate([spot_record(room()), inward(6)])
+    records = inward(6)
     atlas = atlas_of(renderer, tmp_path, room(), records, settings=settings)
     spot, vpls = plain_of(renderer, tmp_path, room(), records, settings)
     assert atlas.shape == (1 + 2, 100, 100)
@@ -97,7 +97,7 @@ def test_sizes_that_do_not_divide_one_another(renderer, tmp_path):
 
 def test_vpl_maps_may_be_larger_than_the_spotlights(renderer, tmp_path):
     settings = {"shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 96}
-    records = np.concatenate([spot_record(room()), inward(2)])
+    records = inward(2)
     atlas = atlas_of(renderer, tmp_path, room(), records, settings=settings)
     spot, vpls = plain_of(renderer, tmp_path, room(), records, settings)
     assert atlas.shape == (1 + 2, 96, 96)
@@ -107,17 +107,17 @@ def test_vpl_maps_may_be_larger_than_the_spotlights(renderer, tmp_path):
 
 
 def test_lights_of_every_block_get_their_maps(renderer, tmp_path):
-    records = np.concatenate([spot_record(room()), inward(2 * LIGHTS_PER_BLOCK + 9)])
+    records = inward(2 * VPLS_PER_BLOCK + 9)
     settings = {"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 16}
     atlas = atlas_of(renderer, tmp_path, room(), records, settings=settings)
-    filled = [(tile(atlas, number, 16) > 0).mean() > 0.9 for number in range(len(records) - 1)]
+    filled = [(tile(atlas, number, 16) > 0).mean() > 0.9 for number in range(len(records))]
     assert all(filled)
 
 
 def test_depth_is_near_over_distance(renderer, tmp_path):
     """A floor seen from straight above fills the map with one value."""
     scene = build(plane(20.0))
-    records = np.concatenate([spot_record(scene), vpl_records([(0, 2.0, 0)], [(0, -1, 0)], [(1, 1, 1)])])
+    records = vpl_records([(0, 2.0, 0)], [(0, -1, 0)], [(1, 1, 1)])
     depths = tile(atlas_of(renderer, tmp_path, scene, records), 0, 32)
     np.testing.assert_allclose(depths, NEAR * scene.geometry.diagonal / 2, rtol=1e-5)
 
@@ -128,9 +128,8 @@ def test_culling_front_faces_draws_what_looks_away(renderer, tmp_path):
     light = vpl_records([(0, 2.0, 0)], [(0, -1, 0)], [(1, 1, 1)])
     for mesh, drawn in ((up, False), (down, True)):
         scene = build(mesh)
-        records = np.concatenate([spot_record(scene), light])
-        atlas = atlas_of(renderer, tmp_path, scene, records, settings={**SETTINGS, "shadow_maps.cull": "front"})
-        plain = plain_of(renderer, tmp_path, scene, records, {**SETTINGS, "shadow_maps.cull": "front"})
+        atlas = atlas_of(renderer, tmp_path, scene, light, settings={**SETTINGS, "shadow_maps.cull": "front"})
+        plain = plain_of(renderer, tmp_path, scene, light, {**SETTINGS, "shadow_maps.cull": "front"})
         assert (tile(atlas, 0, 32).max() > 0) == (plain[1][0].max() > 0) == drawn
 
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from deferred_ir.engine.measurement import Measurement
+from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 from deferred_ir.loading.load import load
 from deferred_ir.profiling.figures import markdown
 from deferred_ir.profiling.limits import bench
 from deferred_ir.profiling.limits.host_costs import cold_start, python_time, seconds
 from deferred_ir.profiling.limits.passes import LIMITS
-from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
@@ -32,7 +32,7 @@ def drawn(renderer, graph, vpls, source, outputs, **options):
         return one.executor.resource(source).read()
 
 
-@pytest.mark.parametrize("vpls", [16, LIGHTS_PER_BLOCK + 8])
+@pytest.mark.parametrize("vpls", [16, VPLS_PER_BLOCK + 8])
 def test_the_limit_of_lighting_counts_the_lights_that_arrive(renderer, vpls):
     limit = drawn(renderer, "limit_lighting", vpls, ("lighting", "radiance"), ["radiance"])[..., 0]
     lit = drawn(renderer, "deferred", vpls, ("lighting", "radiance"), ["radiance"])[..., :3].max(axis=-1)
@@ -44,7 +44,7 @@ def test_the_limit_of_lighting_counts_the_lights_that_arrive(renderer, vpls):
     assert (limit[lit > 0] > 0).mean() > 0.99
 
 
-@pytest.mark.parametrize("vpls", [6, LIGHTS_PER_BLOCK + 8])
+@pytest.mark.parametrize("vpls", [6, VPLS_PER_BLOCK + 8])
 def test_the_limit_of_shadow_maps_draws_the_atlas(renderer, vpls):
     sizes = {"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}
     atlas = drawn(renderer, "deferred", vpls, ("shadow_maps", "atlas"), ["radiance"], set=sizes)[..., 0]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixed_lights import lit_by, spot_record, vpl_records
+from fixed_lights import lit_by, vpl_records
 from small_scenes import box, build, room
 
 from deferred_ir.scene.lights.spot import Spotlight
@@ -44,9 +44,8 @@ def test_paraboloid_maps_show_the_foot_of_a_wall_beside_a_vpl(renderer, tmp_path
     corners = np.concatenate([place, place])
     corners[: len(away), 2], corners[len(away) :, 2] = 0.3 * half, away - half
     vpls = vpl_records(corners, np.tile((0.0, 1.0, 0.0), (len(corners), 1)), np.ones((len(corners), 3)), fov=179.9)
-    records = np.concatenate([spot_record(scene, (0.0, 0.0, 0.0)), vpls])
     settings = {"shadow_maps.projection": "paraboloid", "shadow_maps.vpl_size": 64, "shadow_maps.spot_size": 64}
-    one = lit_by(renderer, tmp_path, records, (64, 64), "deferred", set=settings)
+    one = lit_by(renderer, tmp_path, vpls, (64, 64), "deferred", set=settings, dark=True)
     assert one.render(scene).radiance.max() == 0
 
 
@@ -55,9 +54,8 @@ def test_paraboloid_maps_show_a_low_ceiling(renderer, tmp_path) -> None:
     low = 3e-4
     scene = build(box((-1, -1, -1), (1, 1, 1)), box((-0.5, 0, -0.5), (0.5, low, 0.5)), camera=room().camera)
     vpls = vpl_records([(0.1, 2e-6, 0.2), (0.3, 2e-6, 0.1)], [(0, 1, 0)] * 2, np.ones((2, 3)), fov=179.9)
-    records = np.concatenate([spot_record(scene, (0.0, 0.0, 0.0)), vpls])
     settings = {"shadow_maps.projection": "paraboloid", "shadow_maps.vpl_size": 64, "shadow_maps.spot_size": 64}
-    one = lit_by(renderer, tmp_path, records, (64, 64), "deferred", set=settings)
+    one = lit_by(renderer, tmp_path, vpls, (64, 64), "deferred", set=settings, dark=True)
     assert one.render(scene).radiance.max() == 0
 
 

@@ -10,9 +10,10 @@ import pytest
 from small_scenes import build, plane, quad, room, scaled
 
 from deferred_ir.base.errors import GraphError
+from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 from deferred_ir.graph.params import specs
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import LIGHTS_PER_BLOCK, Spotlight
+from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.scene import Scene
 
 visibility = import_module("deferred_ir.profiling.checks.visibility")
@@ -57,13 +58,13 @@ def frame(renderer):
         one = renderer(size, visibility.GRAPH, set=given, passes=visibility.PASSES)
         plan = one.plan(scene, outputs=[lights])
         one.draw(scene, plan, seed=seed)
-        return visibility.judged(one, scene, plan.outputs[lights][0]), one
+        return visibility.judged(one, scene, lights), one
 
     return draw
 
 
 def records(one):
-    return one.executor.resource(("vpl", "lights")).records
+    return one.executor.resource(("vpl", "vpls")).records
 
 
 # Which pairs
@@ -93,14 +94,13 @@ def test_every_vpl_gets_its_share_of_pixels(frame):
     """VPLs of two blocks of the buffer; all are on the floor and see all of the ceiling, as does the camera."""
     scene = replace(between(), camera=Camera((0.0, 0.05, 0.0), (0.0, 2.0, 0.2), fov=80.0))
     pairs, one = frame(scene, **{"vpl.count": 256, "vpl.fov": 179.0})
-    alive = len(records(one)) - 1
-    assert alive > LIGHTS_PER_BLOCK
-    counts = np.bincount(pairs.light, minlength=alive + 1)
-    assert counts[0] == 0
+    alive = len(records(one))
+    assert alive > VPLS_PER_BLOCK
+    counts = np.bincount(pairs.light, minlength=alive)
     mean = len(pairs.light) / alive
     assert mean > 4
-    assert counts[1:].std() < 1.3 * np.sqrt(mean)  # as drawn at random
-    assert counts[LIGHTS_PER_BLOCK:].mean() == pytest.approx(mean, rel=0.2)
+    assert counts.std() < 1.3 * np.sqrt(mean)  # as drawn at random
+    assert counts[VPLS_PER_BLOCK:].mean() == pytest.approx(mean, rel=0.2)
 
 
 def test_another_seed_draws_other_pairs(frame):
@@ -168,7 +168,7 @@ def test_coarse_maps_have_false_shadows_and_leaks():
 def test_with_a_huge_offset_light_leaks():
     """16 texels on the floor are 0.14, above the square: its whole shadow is gone."""
     low = replace(blocked(0.05), camera=Camera((0.0, 0.04, 0.35), (0.0, 0.0, 0.0)))
-    usual, huge = (rows(low, **{"shadow_maps.spot_offset": offset})["spotlight"] for offset in (1.0, 16.0))
+    usual, huge = (rows(low, **{"spotlight_pairs.spot_offset": offset})["spotlight"] for offset in (1.0, 16.0))
     assert usual.leaks.value < 0.03
     assert huge.leaks.value > 0.5
     assert huge.light_leaked.value > 0.5

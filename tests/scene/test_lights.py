@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from deferred_ir.sampling.warps import build_basis
-from deferred_ir.scene.lights.spot import LIGHT, SPOT_TILE, Spotlight, light_records, one_minus_cos
+from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
 
 COORDINATE = st.floats(-1, 1)
 
@@ -86,40 +86,3 @@ def test_one_minus_cos_is_precise(fov):
 def test_the_axis_is_a_unit_vector_towards_look_at():
     np.testing.assert_allclose(Spotlight((1, 2, 3), (1, 2, -7)).axis, (0, 0, -1))
     np.testing.assert_allclose(Spotlight((0, 0, 0), (3e10, 0, 4e10)).axis, (0.6, 0, 0.8))
-
-
-def test_records_hold_what_shaders_read():
-    position, axis = np.array([[1.0, 2, 3], [4, 5, 6]]), np.array([unit(1, 2, -2), unit(0, 0, -1)])
-    emission = np.array([[7.0, 8, 9], [0.5, 0, 0]])
-    records = light_records(position, axis, emission, fov=150.0, tile=np.array([3, 4]))
-    assert records.dtype == LIGHT
-    assert LIGHT.itemsize == 5 * 16  # five vec4 of std140
-    assert [LIGHT.fields[name][1] for name in ("position", "x_axis", "y_axis", "z_axis", "emission")] == [
-        16 * i for i in range(5)
-    ]
-    np.testing.assert_array_equal(records["position"], position)
-    np.testing.assert_array_equal(records["emission"], emission.astype("f4"))
-    np.testing.assert_allclose(records["z_axis"], axis, atol=1e-7)
-    np.testing.assert_array_equal(records["tile"], [3, 4])
-    np.testing.assert_allclose(records["tan_half"], math.tan(math.radians(75)), rtol=1e-6)
-    np.testing.assert_allclose(records["one_minus_cos"], 1 - math.cos(math.radians(75)), rtol=1e-6)
-    np.testing.assert_array_equal(records["clamp_squared"], 0)
-
-
-@pytest.mark.parametrize("fov", [0.1, 60.0, 150.0, 179.9])
-def test_the_map_axes_take_the_cone_to_the_unit_square(fov):
-    """A direction at the edge of the cone along the map's right lands at NDC (1, 0)."""
-    axis = unit(0.3, -0.9, -0.2)
-    record = light_records(np.zeros((1, 3)), axis[None], np.ones((1, 3)), fov=fov, tile=SPOT_TILE)[0]
-    right, up = build_basis(axis)
-    half = math.radians(fov) / 2
-    for direction, ndc in ((right, (1, 0)), (-right, (-1, 0)), (up, (0, 1)), (-up, (0, -1))):
-        d = math.cos(half) * axis + math.sin(half) * direction
-        w = d @ record["z_axis"].astype(float)
-        seen = (d @ record["x_axis"].astype(float) / w, d @ record["y_axis"].astype(float) / w)
-        np.testing.assert_allclose(seen, ndc, atol=2e-6 * max(1, 1 / math.tan(half), math.tan(half)))
-
-
-def test_no_lights_make_no_records():
-    none = np.zeros((0, 3))
-    assert light_records(none, none, none, fov=150.0, tile=np.arange(0)).shape == (0,)

@@ -1,4 +1,4 @@
-"""A pass of the user's own that stands in for `vpl`: its light records are chosen by the test."""
+"""Passes of the user's own that stand in for `vpl` and `lights`: VPLs of the test's choosing, and a dark spotlight."""
 
 from __future__ import annotations
 
@@ -9,51 +9,60 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.engine.renderer import Renderer
+from deferred_ir.frame.direct_lights import pack_lights
+from deferred_ir.frame.vpl_buffer import BINDING, DEFINES, VPL, VPLS_PER_BLOCK, VplParams, VplsMeta, fill_view
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Output
-from deferred_ir.scene.lights.spot import LIGHT, LIGHTS_PER_BLOCK, SPOT_TILE, light_records
-from deferred_ir.scene.scene import Scene
+from deferred_ir.passes.lights import Lights
+from deferred_ir.scene.lights.spot import one_minus_cos
 
 
-def fixed_lights(records: np.ndarray) -> type[Pass]:
+def fixed_vpls(records: np.ndarray) -> type[Pass]:
     """A pass type that writes these records."""
 
-    class FixedLights(Pass):
+    class FixedVpls(Pass):
         def outputs(self, inputs: Any) -> dict[str, Output]:
-            description = Buffer("light", len(records), LIGHT.itemsize, LIGHTS_PER_BLOCK)
-            return {"lights": Output("lights", description, {"LIGHTS_PER_BLOCK": LIGHTS_PER_BLOCK})}
+            description = Buffer("vpl", len(records), VPL.itemsize, VPLS_PER_BLOCK, binding=BINDING)
+            return {"vpls": Output("VPLs", description, DEFINES, meta=VplsMeta(VplParams(), 1))}
 
         def execute(self, frame: Any, io: Any) -> None:
-            io["lights"].write(records)
+            io["vpls"].write(records)
 
-    return FixedLights
+    return FixedVpls
 
 
-def spot_record(scene: Scene, emission: tuple[float, float, float] | None = None) -> np.ndarray:
-    """The record of the scene's spotlight, shape (1,); its emission may be another."""
-    light = scene.spotlight
-    shine = np.array([light.emission if emission is None else emission])
-    return light_records(np.array([light.position]), light.axis[None], shine, fov=light.fov, tile=SPOT_TILE)
+class DarkLights(Lights):
+    """The lights of the scene without their power; planning takes the scene for lit."""
+
+    def execute(self, frame: Any, io: Any) -> None:
+        records = pack_lights(frame.scene)
+        records["emission"] = 0
+        io["lights"].write(records)
 
 
 def vpl_records(position: Any, normal: Any, emission: Any, *, fov: float = 150.0, clamp: float = 0.0) -> np.ndarray:
     """Records of VPLs; `clamp` is a distance."""
     axis = np.asarray(normal, float)
-    records = light_records(
-        np.asarray(position, float),
-        axis / np.linalg.norm(axis, axis=1, keepdims=True),
-        np.asarray(emission, float),
-        fov=fov,
-        tile=np.arange(len(axis), dtype=float),
-    )
-    records["clamp_squared"] = clamp**2
+    records = np.zeros(len(axis), VPL)
+    records["position"], records["emission"] = position, emission
+    records["one_minus_cos"], records["clamp_squared"] = one_minus_cos(fov), clamp**2
+    records["tile"] = np.arange(len(axis))
+    fill_view(records, axis / np.linalg.norm(axis, axis=1, keepdims=True), fov)
     return records
 
 
 def lit_by(
-    make: Callable[..., Renderer], folder: Path, records: np.ndarray, size: tuple[int, int], graph: str, **options: Any
+    make: Callable[..., Renderer],
+    folder: Path,
+    vpls: np.ndarray,
+    size: tuple[int, int],
+    graph: str,
+    *,
+    dark: bool = False,
+    **options: Any,
 ) -> Renderer:
-    """A Renderer of a built-in graph in which these records are all lights. `make` is the fixture `renderer`."""
+    """A Renderer of a built-in graph with these VPLs. `make` is the fixture `renderer`; dark: the spotlight is off."""
     path = folder / f"fixed_{graph}.toml"
-    path.write_text(f'extends = "{graph}"\n[passes.vpl]\ntype = "fixed_lights"\n', encoding="utf-8")
-    return make(size, path, passes={"fixed_lights": fixed_lights(records)}, **options)
+    lights = '[passes.lights]\ntype = "dark_lights"\n' if dark else ""
+    path.write_text(f'extends = "{graph}"\n[passes.vpl]\ntype = "fixed_vpls"\n{lights}', encoding="utf-8")
+    return make(size, path, passes={"fixed_vpls": fixed_vpls(vpls), "dark_lights": DarkLights}, **options)

@@ -17,6 +17,6 @@ def read_vpl_maps(one: Renderer, size: int = 32) -> dict[int, np.ndarray]:
     """The maps (size, size) of the VPLs that are alive, by tile."""
     atlas = read_atlas(one)
     per_row = atlas.shape[1] // size
-    tiles = one.executor.resource(("vpl", "lights")).records["tile"][1:].astype(int)
+    tiles = one.executor.resource(("vpl", "vpls")).records["tile"].astype(int)
     rows = atlas.reshape(len(atlas), per_row, size, per_row, size).swapaxes(2, 3)
     return {tile: rows[1 + tile // per_row**2, tile % per_row**2 // per_row, tile % per_row] for tile in tiles}

@@ -12,12 +12,12 @@ from virtual_display import FEW, SIZE, Spy, act, arrange, cornell, frames, middl
 
 from deferred_ir.cli import main
 from deferred_ir.frame.frame import NEAR
-from deferred_ir.frame.light_culling import shining
+from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.graph.file import graph_hash, load_graph
 from deferred_ir.loading.load import load
 from deferred_ir.viewer.panels import reference
 from deferred_ir.viewer.panels import side_panel as panels
-from deferred_ir.viewer.panels.light_axes import find_lights
+from deferred_ir.viewer.panels.light_axes import find_records
 from deferred_ir.viewer.panels.side_panel import WIDTH
 
 PARTS = ("Scene", "Light", "Passes", "Parameters", "Reference", "Shadow map", "Save", "Keys")
@@ -102,8 +102,8 @@ def test_the_map_of_any_light_stands_in_the_corner(viewer, graph, settings):
     viewer.controls.switches["map"] = True
     maps, edge = viewer.panel.maps, round(0.33 * SIZE[1])
     viewer.frame()
-    lights = find_lights(viewer.session)
-    tiles = sorted(lights["tile"][shining(lights)].astype(int).tolist())
+    vpls = find_records(viewer.session, "vpl")
+    tiles = [-1, *sorted(vpls["tile"][find_shining(vpls)].astype(int).tolist())]  # the spotlight's map comes first
     assert len(tiles) > 4
     for maps.light, maps.linear in product((0, 2, len(tiles) - 1), (True, False)):
         viewer.frame()

@@ -264,7 +264,7 @@ GRAPH = """extends = "deferred"
 [outputs]
 residual = "near_field.residual"
 [passes.near_field]
-inputs = { lights = "vpl.lights", depth = "gbuffer.depth", normals = "gbuffer.normals" }
+inputs = { vpls = "vpl.vpls", depth = "gbuffer.depth", normals = "gbuffer.normals" }
 """
 
 
@@ -346,6 +346,6 @@ def test_the_graph_accurate_clamps_the_more_the_fewer_vpls_there_are(renderer):
     one = renderer(SIZE, "accurate")
     for vpls in (16, 64):
         one.draw(scene, one.plan(scene, vpls))
-        records = one.executor.resource(("vpl", "lights")).records
+        records = one.executor.resource(("vpl", "vpls")).records
         distances.append(records["clamp_squared"][1] ** 0.5 / scene.geometry.diagonal)
     np.testing.assert_allclose(distances, [0.16, 0.08], rtol=1e-5)

@@ -168,10 +168,3 @@ def test_a_light_that_jumps_is_refilled_within_the_budget():
     assert alive[0] < 24
     assert (np.diff(alive) <= 8).all()
     assert alive[-1] == 64
-
-
-def test_the_spotlights_own_version_changes_as_it_moves():
-    state = IncrementalVpls(4)
-    first = state.find_spot_version(LIGHT)
-    assert state.find_spot_version(replace(LIGHT, emission=(1.0, 1.0, 1.0))) == first
-    assert len({first, *(state.find_spot_version(replace(LIGHT, fov=fov)) for fov in (10.0, 20.0))}) == 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from distance import assert_same_but_for_edges, rel_mse
-from fixed_lights import lit_by, spot_record, vpl_records
+from fixed_lights import lit_by, vpl_records
 from hypothesis import given
 from hypothesis import strategies as st
 from small_scenes import Mesh, box, build, crooked_room, plane, quad, room, sphere
@@ -145,10 +145,10 @@ def test_constant_irradiance_is_kept_to_rounding(renderer, tmp_path, n, vpls):
     scene = build(plane(), camera=ABOVE)
     away = np.random.default_rng(3).normal(size=(vpls, 3)) * (1, 0, 1) + (0, 2, 0)
     away *= 1e5 / np.linalg.norm(away, axis=1, keepdims=True)
-    records = np.concatenate([spot_record(scene, (0, 0, 0)), vpl_records(away, -away, np.full((vpls, 3), 1e9))])
+    records = vpl_records(away, -away, np.full((vpls, 3), 1e9))
     size = (45, 38)
-    full = lit_by(renderer, tmp_path, records, size, "deferred").render(scene).radiance
-    one = lit_by(renderer, tmp_path, records, size, "interleaved", set={"interleave.n": n})
+    full = lit_by(renderer, tmp_path, records, size, "deferred", dark=True).render(scene).radiance
+    one = lit_by(renderer, tmp_path, records, size, "interleaved", set={"interleave.n": n}, dark=True)
     shared = one.render(scene).radiance
     assert full.min() > 0
     np.testing.assert_allclose(shared, full, rtol=1e-4)
@@ -157,9 +157,9 @@ def test_constant_irradiance_is_kept_to_rounding(renderer, tmp_path, n, vpls):
 def test_vpls_several_half_widths_away_from_a_plane(renderer, tmp_path):
     scene = build(plane(), camera=ABOVE)
     away = np.random.default_rng(4).normal(size=(256, 3)) * (2, 0, 2) + (0, 3, 0)
-    records = np.concatenate([spot_record(scene, (0, 0, 0)), vpl_records(away, (0, -1, 0) + 0 * away, 1 + 0 * away)])
+    records = vpl_records(away, (0, -1, 0) + 0 * away, 1 + 0 * away)
     full, shared = (
-        lit_by(renderer, tmp_path, records, (128, 128), graph).render(scene).radiance
+        lit_by(renderer, tmp_path, records, (128, 128), graph, dark=True).render(scene).radiance
         for graph in ("deferred", "interleaved")
     )
     assert full.min() > 0
@@ -193,9 +193,8 @@ def test_no_light_crosses_an_edge(renderer, tmp_path, name, n):
     scene, (at, towards) = EDGES[name]
     at = at + np.random.default_rng(1).uniform(-0.02, 0.02, (64, 3))
     lights = vpl_records(at, np.broadcast_to(towards, at.shape), np.ones((64, 3)))
-    records = np.concatenate([spot_record(scene, (0, 0, 0)), lights])
     full, shared = (
-        lit_by(renderer, tmp_path, records, (96, 80), graph, **options).render(scene).radiance
+        lit_by(renderer, tmp_path, lights, (96, 80), graph, **options, dark=True).render(scene).radiance
         for graph, options in (("deferred", {}), ("interleaved", {"set": {"interleave.n": n}}))
     )
     dark = full.max(axis=-1) == 0

@@ -12,6 +12,7 @@ from moving_scenes import AROUND, UP, VECTORS, WALLS, bake, pose_matrix, room_wi
 from shadow_atlas import read_atlas, read_vpl_maps
 from small_scenes import box, build
 
+from deferred_ir.frame.direct_lights import LightVersions, pack_lights
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.geometry import transform_points
 from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
@@ -144,20 +145,22 @@ def test_lights_that_a_model_moves_behind_do_not_notice():
     scene = build(WALLS, box((-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)), motions=(None, shade), spotlight=light)
     tracer, state = Tracer(scene.at(0.0)), IncrementalVpls(16)
     state.update(light, tracer, least=0, most=16)
-    spot, before = state.find_spot_version(light), state.version.copy()
+    spotlight, before = LightVersions(), state.version.copy()
+    spot = spotlight.update(pack_lights(scene), scene.at(0.0))
     tracer.follow(scene.at(0.5))
     state.update(light, tracer, least=0, most=16)
-    assert state.find_spot_version(light) == spot
+    assert spotlight.update(pack_lights(scene), scene.at(0.5)) == spot
     assert (state.version != before).all()
     # Below the floor, behind the VPLs and before the light: the other way round.
     deep = replace(shade, translations=((0.0, -3.0, 0.0), (0.2, -3.0, 0.0)))
     scene = build(WALLS, box((-0.1, -0.1, -0.1), (0.1, 0.1, 0.1)), motions=(None, deep), spotlight=light)
     tracer, state = Tracer(scene.at(0.0)), IncrementalVpls(16)
     state.update(light, tracer, least=0, most=16)
-    spot, before = state.find_spot_version(light), state.version.copy()
+    spotlight, before = LightVersions(), state.version.copy()
+    spot = spotlight.update(pack_lights(scene), scene.at(0.0))
     tracer.follow(scene.at(0.5))
     state.update(light, tracer, least=0, most=16)
-    assert state.find_spot_version(light) != spot
+    assert spotlight.update(pack_lights(scene), scene.at(0.5)) != spot
     assert (state.version == before).all()
 
 

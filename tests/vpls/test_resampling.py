@@ -53,7 +53,7 @@ def made_up(count, seed=0):
 
 
 def lights(one):
-    return one.executor.resource(("vpl", "lights")).records
+    return one.executor.resource(("vpl", "vpls")).records
 
 
 # The choice

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools
+from deferred_ir.frame.vpl_buffer import make_axes
 from deferred_ir.gl.buffers import GpuBuffer
-from deferred_ir.scene.lights.spot import LIGHT
 from deferred_ir.viewer.canvas import Area
 from deferred_ir.viewer.session import Session
 
@@ -18,15 +18,27 @@ COLORS = ((1.0, 0.25, 0.2), (0.3, 0.9, 0.3), (0.3, 0.5, 1.0))
 DIM = 0.25
 
 
-def find_lights(session: Session) -> np.ndarray | None:
-    """Return the LIGHT records of the last frame, from whichever step writes them; None if none does."""
+def find_records(session: Session, kind: str) -> np.ndarray | None:
+    """Return the records of the last frame in the first buffer of format `kind`, "light" or "vpl"."""
     for step in session.plan.steps:
         for port, output in step.outputs.items():
-            is_light = getattr(output.description, "format", "") == "light"
-            buffer = session.output((step.name, port)) if is_light else None
-            if isinstance(buffer, GpuBuffer) and buffer.records.dtype == LIGHT:
-                return buffer.records
+            if getattr(output.description, "format", "") == kind:
+                found = session.output((step.name, port))
+                return found.records if isinstance(found, GpuBuffer) else None
     return None
+
+
+def find_bases(session: Session) -> tuple[Array, Array] | None:
+    """Return where direct lights and VPLs are, (n, 3), direct lights first, and their axes x, y, z, (n, 3, 3)."""
+    lights, vpls = find_records(session, "light"), find_records(session, "vpl")
+    if lights is None or vpls is None:
+        return None
+    forward = lights["axis"].astype(float)
+    of_lights = np.stack([*make_axes(forward, 90.0)[:2], forward], axis=1)
+    of_vpls = np.stack([vpls[name] for name in ("x_axis", "y_axis", "z_axis")], axis=1).astype(float)
+    axes = np.concatenate([of_lights, of_vpls])
+    axes /= np.maximum(np.linalg.norm(axes, axis=-1, keepdims=True), 1e-30)
+    return np.concatenate([lights["position"], vpls["position"]]).astype(float), axes
 
 
 def project(points: Array, session: Session) -> tuple[Array, Bools]:
@@ -43,14 +55,12 @@ def project(points: Array, session: Session) -> tuple[Array, Bools]:
 
 def draw_axes(imgui: Any, session: Session, area: Area, window_height: int, covered: int = 0) -> None:
     """Draw all lights over the picture in `area`, except over a square of `covered` pixels in its lower left corner."""
-    lights = find_lights(session)
-    if lights is None:
+    bases = find_bases(session)
+    if bases is None:
         return
-    origin, centre = lights["position"].astype(float), session.scene.geometry.centre
-    axes = np.stack([lights[name] for name in ("x_axis", "y_axis", "z_axis")], axis=1).astype(float)
-    axes /= np.maximum(np.linalg.norm(axes, axis=-1, keepdims=True), 1e-30)
-    length = np.full(len(lights), LENGTH * session.scene.geometry.diagonal)
-    length[0] *= 3
+    (origin, axes), centre = bases, session.scene.geometry.centre
+    direct = np.arange(len(origin)) < len(session.renderer.executor.resource(("lights", "lights")).records)
+    length = LENGTH * session.scene.geometry.diagonal * np.where(direct, 3, 1)
     tips = origin[:, None] + axes * length[:, None, None]
     tracer = session.renderer.tracer()
     lifted = tracer.lift(origin, axes[:, 2])
@@ -68,5 +78,5 @@ def draw_axes(imgui: Any, session: Session, area: Area, window_height: int, cove
             if end_seen[i, axis]:
                 packed = imgui.get_color_u32(imgui.ImVec4(*color, DIM if hidden[i] else 1.0))
                 a, b = start[i] + shift, end[i, axis] + shift
-                lines.add_line(imgui.ImVec2(*a), imgui.ImVec2(*b), packed, 3.0 if i == 0 else 1.5)
+                lines.add_line(imgui.ImVec2(*a), imgui.ImVec2(*b), packed, 3.0 if direct[i] else 1.5)
     lines.pop_clip_rect()

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from deferred_ir.frame.light_culling import shining
+from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.graph import Step
 from deferred_ir.graph.ports import Texture
 from deferred_ir.viewer.canvas import Area, Canvas
 from deferred_ir.viewer.controls import Controls
-from deferred_ir.viewer.panels.light_axes import find_lights
+from deferred_ir.viewer.panels.light_axes import find_records
 from deferred_ir.viewer.session import Session
 
 EDGE = 0.33
@@ -59,17 +59,19 @@ class ShadowMapsPanel:
         return maps
 
     def _find_textures(self, step: Step) -> list[Map]:
-        """Return the depth textures in lists that a step writes: the spotlight's, then one for each VPL's tile."""
-        textures: list[GpuTexture] = []
+        """Return the maps in lists of textures that a step writes, one each: direct lights, then VPLs' tiles."""
+        lists: list[list[GpuTexture]] = []
         for port, output in step.outputs.items():
             written = self._session.output((step.name, port))
             if isinstance(output.description, Texture) and isinstance(written, list) and written[0].format.depth:
-                textures += written
-        lights = find_lights(self._session)
-        if not textures or lights is None:
+                lists.append(written)
+        lights, vpls = (find_records(self._session, kind) for kind in ("light", "vpl"))
+        if len(lists) != 2 or lights is None or vpls is None:
             return []
-        tiles = sorted(lights["tile"][shining(lights)].astype(int).tolist())
-        return [Map(f"vpl {tile}" if tile >= 0 else "spotlight", "", textures[tile + 1]) for tile in tiles]
+        views = lights["view"][find_shining(lights)].astype(int).tolist()
+        tiles = sorted(vpls["tile"][find_shining(vpls)].astype(int).tolist())
+        maps = [Map("spotlight", "", lists[0][view]) for view in views]
+        return maps + [Map(f"vpl {tile}", "", lists[1][tile]) for tile in tiles]
 
     def edge(self, area: Area) -> int:
         """Return width and height in pixels of the map in the corner, 0 if none is shown."""

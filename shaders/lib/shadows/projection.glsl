@@ -1,47 +1,31 @@
-// Shadow maps: where a light sees a point, and how far. Writer and readers share it.
+// Shadow maps: where a view sees a point, and how far. Writer and readers share it.
 //
-// A planar map covers the light's cone by a perspective projection, with reversed depth along its axis (lib/camera/depth.glsl).
-// A paraboloid map (Brabec et al. 2002), which can be as wide as the hemisphere, is the stereographic projection of the
-// directions: the cone's edge is the circle of radius 1, and the depth is near / distance. VPLs' maps are paraboloid
-// where VPL_PARABOLOID is 1; the spotlight's is where it is wider than WIDE_SPOT says, whatever those of the VPLs are, and
-// SPOT_PARABOLOID tells it where it is known.
+// A planar map covers the view's cone by a perspective projection, with reversed depth along its axis
+// (lib/camera/depth.glsl). A paraboloid map (Brabec et al. 2002), which can be as wide as the hemisphere, is the
+// stereographic projection of the directions: the cone's edge is the circle of radius 1, and the depth is
+// near / distance.
 #include "lib/camera/frame.glsl"
 #include "lib/lights/light.glsl"
+#include "lib/shadows/view.glsl"
 
-const float SPOT_LIFT = 100.0;  // near planes: a millionth of the scene
-
-bool spot_paraboloid(Light light) {
-#ifdef SPOT_PARABOLOID
-    return SPOT_PARABOLOID == 1;
-#else
-    return light.one_minus_cos > WIDE_SPOT;
-#endif
+// What the map's coordinates of a point at `d` from the view are divided by: its depth along the axis in a planar map.
+float planar_divisor(View view, vec3 d) {
+    return dot(d, view.z_axis);
 }
 
-// What the map's coordinates of a point at `d` from the light are divided by: its depth along the axis in a planar map.
-float planar_divisor(Light light, vec3 d) {
-    return dot(d, light.z_axis);
+float paraboloid_divisor(View view, vec3 d) {
+    return view.curve * (length(d) + dot(d, view.z_axis));
 }
 
-float paraboloid_divisor(Light light, vec3 d) {
-    return light.curve * (length(d) + dot(d, light.z_axis));
+// A texel of the paraboloid map as an angle, where it is largest, in the middle of the map.
+float texel_angle(View view) {
+    return 4.0 * view.curve * view.tan_half / view.size;
 }
 
-// A texel of the light's paraboloid map as an angle, where it is largest, in the middle of the map.
-float texel_angle(Light light) {
-    return 4.0 * light.curve * light.tan_half / (light.tile < 0.0 ? float(SPOT_SIZE) : float(VPL_SIZE));
-}
-
-// Where a light's map is seen from. The spotlight may hang in a surface, whose roundings must not hide what it looks at;
-// VPLs have been lifted off theirs (deferred_ir/frame/light_buffer.py).
-vec3 map_origin(Light light) {
-    return light.position + light.z_axis * (light.tile < 0.0 ? SPOT_LIFT * frame.near : 0.0);
-}
-
-// Clip position in the light's planar map.
-vec4 planar_clip(Light light, vec3 position) {
-    vec3 d = position - map_origin(light);
-    return clip_position(vec2(dot(d, light.x_axis), dot(d, light.y_axis)), frame.near, planar_divisor(light, d));
+// Clip position in the view's planar map.
+vec4 planar_clip(View view, vec3 position) {
+    vec3 d = position - view.position;
+    return clip_position(vec2(dot(d, view.x_axis), dot(d, view.y_axis)), frame.near, planar_divisor(view, d));
 }
 
 // A point as a map knows it. slope: change of depth, a texel to the right and up, on the plane of the point's face.
@@ -55,53 +39,53 @@ struct Receiver {
     float reach;
 };
 
-// The point is lifted off its face by `offset` texels of the map of `size` texels: its depth and those in the map come
+// The point is lifted off its face by `offset` texels of the map: its depth and those in the map come
 // from different roundings. No world units are involved.
-vec3 lifted(Light light, vec3 from, vec3 normal, float size, float offset, float divisor) {
-    return from + normal * (2.0 * offset / size * light.tan_half * divisor);
+vec3 lifted(View view, vec3 from, vec3 normal, float offset, float divisor) {
+    return from + normal * (2.0 * offset / view.size * view.tan_half * divisor);
 }
 
-// Distance of the light behind the plane of the face; where the plane goes through the light no light arrives, and a
-// millionth of the way to the point stands for 0, or TINY where the point is the light's own.
+// Distance of the view behind the plane of the face; where the plane goes through it no light arrives, and a
+// millionth of the way to the point stands for 0, or TINY where the point is the view's own.
 float plane_distance(vec3 d, vec3 normal) {
     return min(dot(normal, d), -1e-6 * length(d) - TINY);
 }
 
-Receiver planar_receiver(Light light, vec3 position, vec3 normal, float size, float offset) {
-    vec3 from = position - light.position;
-    vec3 d = lifted(light, from, normal, size, offset, planar_divisor(light, from));
-    float w = max(planar_divisor(light, d), frame.near);  // behind the near plane nothing was drawn, and cosines are 0
-    vec2 n = vec2(dot(normal, light.x_axis), dot(normal, light.y_axis));
+Receiver planar_receiver(View view, vec3 position, vec3 normal, float offset) {
+    vec3 from = position - view.position;
+    vec3 d = lifted(view, from, normal, offset, planar_divisor(view, from));
+    float w = max(planar_divisor(view, d), frame.near);  // behind the near plane nothing was drawn, and cosines are 0
+    vec2 n = vec2(dot(normal, view.x_axis), dot(normal, view.y_axis));
     Receiver r;
-    r.texel = (vec2(dot(d, light.x_axis), dot(d, light.y_axis)) / w * 0.5 + 0.5) * size;
+    r.texel = (vec2(dot(d, view.x_axis), dot(d, view.y_axis)) / w * 0.5 + 0.5) * view.size;
     r.depth = frame.near / w;
     // 1/w is linear in the map over a plane.
-    r.slope = n * (2.0 / size * frame.near * light.tan_half * light.tan_half / plane_distance(d, normal));
+    r.slope = n * (2.0 / view.size * frame.near * view.tan_half * view.tan_half / plane_distance(d, normal));
     r.bend = vec4(0.0);
     r.reach = 0.0;
     return r;
 }
 
-Receiver paraboloid_receiver(Light light, vec3 position, vec3 normal, float size, float offset) {
-    vec3 from = position - light.position;
-    vec3 d = lifted(light, from, normal, size, offset, paraboloid_divisor(light, from));
-    float inverse = inversesqrt(max(dot(d, d), TINY)), cosine = dot(d, light.z_axis) * inverse;
-    float h = plane_distance(d, normal), tan_quarter = light.curve * light.tan_half;
-    vec2 n = vec2(dot(normal, light.x_axis), dot(normal, light.y_axis)) * light.tan_half;
-    // Behind the light nothing was drawn, and cosines are 0.
-    vec2 ndc = vec2(dot(d, light.x_axis), dot(d, light.y_axis)) * (inverse / (light.curve * max(1.0 + cosine, 0.5)));
+Receiver paraboloid_receiver(View view, vec3 position, vec3 normal, float offset) {
+    vec3 from = position - view.position;
+    vec3 d = lifted(view, from, normal, offset, paraboloid_divisor(view, from));
+    float inverse = inversesqrt(max(dot(d, d), TINY)), cosine = dot(d, view.z_axis) * inverse;
+    float h = plane_distance(d, normal), tan_quarter = view.curve * view.tan_half;
+    vec2 n = vec2(dot(normal, view.x_axis), dot(normal, view.y_axis)) * view.tan_half;
+    // Behind the view nothing was drawn, and cosines are 0.
+    vec2 ndc = vec2(dot(d, view.x_axis), dot(d, view.y_axis)) * (inverse / (view.curve * max(1.0 + cosine, 0.5)));
     Receiver r;
-    r.texel = (ndc * 0.5 + 0.5) * size;
+    r.texel = (ndc * 0.5 + 0.5) * view.size;
     r.depth = frame.near * inverse;
     // On a plane at distance h, 1/distance is dot(normal, direction) / h: this is its derivative.
-    r.slope = (n - ndc * (tan_quarter * (dot(normal, light.z_axis) + h * inverse)))
-            * (2.0 / size * frame.near * tan_quarter * (1.0 + cosine) / h);
-    float step = 2.0 / size * tan_quarter, square = 0.5 * (1.0 + cosine) * step * step;
+    r.slope = (n - ndc * (tan_quarter * (dot(normal, view.z_axis) + h * inverse)))
+            * (2.0 / view.size * frame.near * tan_quarter * (1.0 + cosine) / h);
+    float step = 2.0 / view.size * tan_quarter, square = 0.5 * (1.0 + cosine) * step * step;
     r.bend = vec4(ndc * (tan_quarter * step * (1.0 + cosine)), square,
-                  square * frame.near * (dot(normal, light.z_axis) / h + inverse));
-    // At the rim of the hemisphere, 1 / tan_quarter from the middle, drawing ends: four texels are 2 sqrt(2) / size away at
-    // most. tan_quarter is that of a quarter of the cone's angle, which is not 0.
-    r.reach = min(1.0 / tan_quarter - 2.83 / size, 1.0);
+                  square * frame.near * (dot(normal, view.z_axis) / h + inverse));
+    // At the rim of the hemisphere, 1 / tan_quarter from the middle, drawing ends: four texels are 2 sqrt(2) / size away
+    // at most. tan_quarter is that of a quarter of the cone's angle, which is not 0.
+    r.reach = min(1.0 / tan_quarter - 2.83 / view.size, 1.0);
     return r;
 }
 
@@ -123,7 +107,7 @@ vec3 receiver_plane(Receiver r, vec2 offset) {
 }
 
 // Where to compare, in texels, and the depth to compare with, `offset` texels away. Kept half a texel inside, so that a 2x2
-// comparison never leaves the map or tile. Beyond the disc of a paraboloid map lies what the light does not shine on.
+// comparison never leaves the map or tile. Beyond the disc of a paraboloid map lies what the view does not see.
 vec3 comparison(Receiver r, float size, vec2 offset) {
     vec2 texel = r.texel + offset, ndc = texel * (2.0 / size) - 1.0;
     if (r.reach > 0.0) texel -= ndc * (1.0 - min(r.reach * inversesqrt(max(dot(ndc, ndc), TINY)), 1.0)) * (0.5 * size);
@@ -137,14 +121,8 @@ vec3 comparison(Receiver r, float size) {
     return nearest_of_four(r, clamp(r.texel, 0.5, size - 0.5), r.depth, r.slope);
 }
 
-Receiver SPOT_RECEIVER(Light light, vec3 position, vec3 normal, float size, float offset) {
-    light.position = map_origin(light);
-    if (spot_paraboloid(light)) return paraboloid_receiver(light, position, normal, size, offset);
-    return planar_receiver(light, position, normal, size, offset);
+// The point `position` of a face with the geometric normal `normal`, lifted off it by `offset` texels.
+Receiver receiver(View view, vec3 position, vec3 normal, float offset) {
+    if (view.paraboloid > 0.5) return paraboloid_receiver(view, position, normal, offset);
+    return planar_receiver(view, position, normal, offset);
 }
-
-#if VPL_PARABOLOID
-#define VPL_RECEIVER paraboloid_receiver
-#else
-#define VPL_RECEIVER planar_receiver
-#endif

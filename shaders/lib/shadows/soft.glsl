@@ -1,30 +1,30 @@
 // Soft shadows of a spotlight that is a disc: blocker search, penumbra, filter (Fernando 2005). lib/shadows/atlas.glsl or
 // lib/shadows/single.glsl, included before, says how a map is read.
 //
-// Points are held as v / depth, v a vector of the light's frame: (x, y, 1) by tangents in a planar map, the unit
+// Points are held as v / depth, v a vector in the view's axes: (x, y, 1) by tangents in a planar map, the unit
 // direction in a paraboloid. The line from the receiver r through a blocker b meets the disc's plane at
 // near (r.z b.xy - b.z r.xy) / (r.z depth_b - b.z depth_r), in both.
 #include "lib/shadows/filter.glsl"
 
-vec3 map_vector(Light light, vec2 texel) {
-    vec2 ndc = texel * (2.0 / SPOT_SIZE) - 1.0;
-    if (!spot_paraboloid(light)) return vec3(ndc * light.tan_half, 1.0);
-    vec2 p = ndc * (light.curve * light.tan_half);
+vec3 map_vector(View view, vec2 texel) {
+    vec2 ndc = texel * (2.0 / view.size) - 1.0;
+    if (view.paraboloid <= 0.5) return vec3(ndc * view.tan_half, 1.0);
+    vec2 p = ndc * (view.curve * view.tan_half);
     return vec3(2.0 * p, 1.0 - dot(p, p)) / (1.0 + dot(p, p));
 }
 
-// v points forwards: at the receiver, from where it is moved within the plane across the light's axis.
-vec2 map_texel(Light light, vec3 v) {
-    float divisor = spot_paraboloid(light) ? light.curve * (length(v) + v.z) : v.z;
-    return (v.xy / (divisor * light.tan_half) * 0.5 + 0.5) * SPOT_SIZE;
+// v points forwards: at the receiver, from where it is moved within the plane across the view's axis.
+vec2 map_texel(View view, vec3 v) {
+    float divisor = view.paraboloid > 0.5 ? view.curve * (length(v) + v.z) : v.z;
+    return (v.xy / (divisor * view.tan_half) * 0.5 + 0.5) * view.size;
 }
 
 // What the map holds `offset` texels away, if it lies between receiver and a disc of `radius`: the receiver's distance
 // over its own, from the plane of the disc; else 0.
-float blocker(DEPTHS map, Light light, Receiver r, vec3 v, vec2 offset, float radius) {
-    vec2 texel = floor(clamp(r.texel + offset, 0.5, SPOT_SIZE - 0.5)) + 0.5;
-    float depth = spot_depth(map, ivec2(texel));
-    vec3 b = map_vector(light, texel);
+float blocker(DEPTHS map, View view, Receiver r, vec3 v, vec2 offset, float radius) {
+    vec2 texel = floor(clamp(r.texel + offset, 0.5, view.size - 0.5)) + 0.5;
+    float depth = depth_at(map, view.rectangle, ivec2(texel));
+    vec3 b = map_vector(view, texel);
     float nearer = v.z * depth - b.z * r.depth;
     vec2 off = frame.near * (v.z * b.xy - b.z * v.xy);
     bool between = nearer > 0.0 && b.z > 0.0 && dot(off, off) <= radius * radius * nearer * nearer;
@@ -33,26 +33,25 @@ float blocker(DEPTHS map, Light light, Receiver r, vec3 v, vec2 offset, float ra
 }
 
 // -1 where nothing that hides a part of the disc is found: the penumbra is narrower than the search can see.
-float soft_visibility(MAP map, DEPTHS depths, Light light, Receiver r) {
-    float radius = disc_radius(light);
-    vec3 v = map_vector(light, r.texel), point = v * (frame.near / r.depth);
+float soft_visibility(MAP map, DEPTHS depths, View view, float radius, Receiver r) {
+    vec3 v = map_vector(view, r.texel), point = v * (frame.near / r.depth);
     float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));  // Jimenez 2014
     vec2 start = vec2(cos(6.28318531 * noise), sin(6.28318531 * noise)), direction = start;
     // How close to the light lies what may hide a part of the disc? Taps at all scales, from all of the map on down over
     // nine octaves; for a disc four times as wide, so that they meet things of which only a rim is in the way.
-    float nearest = blocker(depths, light, r, v, vec2(0.0), radius);
+    float nearest = blocker(depths, view, r, v, vec2(0.0), radius);
     for (int i = 0; i < SEARCH_TAPS; ++i) {
-        float away = SPOT_SIZE * exp2(-9.0 * (float(i) + noise) / float(SEARCH_TAPS));
-        nearest = max(nearest, blocker(depths, light, r, v, direction * away, 4.0 * radius));
+        float away = view.size * exp2(-9.0 * (float(i) + noise) / float(SEARCH_TAPS));
+        nearest = max(nearest, blocker(depths, view, r, v, direction * away, 4.0 * radius));
         direction = turned(direction);
     }
     if (nearest <= 1.0) return -1.0;
-    float window = length(map_texel(light, point + vec3(radius * (nearest - 1.0), 0.0, 0.0)) - r.texel);
+    float window = length(map_texel(view, point + vec3(radius * (nearest - 1.0), 0.0, 0.0)) - r.texel);
     // Their mean, over the part of the map where things so close could hide a part.
     float sum = 0.0, found = 0.0;
     direction = start;
     for (int i = 0; i < SEARCH_TAPS; ++i) {
-        float one = blocker(depths, light, r, v, direction * (window * sqrt(float(i) / float(SEARCH_TAPS))), radius);
+        float one = blocker(depths, view, r, v, direction * (window * sqrt(float(i) / float(SEARCH_TAPS))), radius);
         sum += one;
         found += float(one > 0.0);
         direction = turned(direction);
@@ -61,18 +60,11 @@ float soft_visibility(MAP map, DEPTHS depths, Light light, Receiver r) {
     float reach = radius * (sum / found - 1.0);
     // From the receiver to points of the disc, past a blocker at that distance.
     float lit = 0.0;
-    vec4 place = map_place(light);
     direction = start;
     for (int i = 0; i < SOFT_TAPS; ++i) {
-        vec2 offset = map_texel(light, point + vec3(direction * (reach * spread(i, SOFT_TAPS)), 0.0)) - r.texel;
-        lit += compared(map, place, SPOT_SIZE, comparison(r, SPOT_SIZE, offset));
+        vec2 offset = map_texel(view, point + vec3(direction * (reach * spread(i, SOFT_TAPS)), 0.0)) - r.texel;
+        lit += compared(map, view.rectangle, view.size, comparison(r, view.size, offset));
         direction = turned(direction);
     }
     return lit / float(SOFT_TAPS);
-}
-
-float spot_visibility(MAP map, DEPTHS depths, Light light, vec3 position, vec3 normal) {
-    Receiver receiver = SPOT_RECEIVER(light, position, normal, SPOT_SIZE, SPOT_OFFSET);
-    float soft = soft_visibility(map, depths, light, receiver);
-    return soft >= 0.0 ? soft : filtered(map, light, receiver, SPOT_SIZE, SPOT_KERNEL, SPOT_TAPS);
 }

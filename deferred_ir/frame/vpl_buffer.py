@@ -1,0 +1,134 @@
+"""VPLs on the GPU: a record for each."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Bools, Ints
+from deferred_ir.base.versions import new_versions
+from deferred_ir.frame.vpl_params import VplParams
+from deferred_ir.graph.ports import Buffer, Output
+from deferred_ir.sampling.warps import build_basis
+from deferred_ir.scene.geometry import Geometry
+from deferred_ir.scene.lights.spot import one_minus_cos
+from deferred_ir.scene.scene import Scene
+from deferred_ir.vpls.cast import Vpls
+from deferred_ir.vpls.kernel import VplLimits
+
+VPL = np.dtype(
+    [
+        ("position", "f4", 3),
+        ("one_minus_cos", "f4"),  # 1 - cos of the half cone angle, without cancellation
+        ("x_axis", "f4", 3),  # right and up, divided by tan(half angle): NDC = dot(d, axis) / dot(d, z_axis)
+        ("tan_half", "f4"),
+        ("y_axis", "f4", 3),
+        ("clamp_squared", "f4"),  # 1/d^2 is taken as 1/max(d^2, this)
+        ("z_axis", "f4", 3),  # unit; the normal of its surface
+        ("tile", "f4"),  # of the shadow atlas
+        ("emission", "f4", 3),
+        ("curve", "f4"),  # c / (1 + c), c the cosine of the half cone angle: scales paraboloid maps
+    ]
+)
+"""One VPL in a std140 uniform block; shaders/lib/lights/vpl.glsl declares the same five vec4. It is its own view."""
+
+BINDING = 1
+VPLS_PER_BLOCK = 192
+"""VPLs in a uniform block: OpenGL promises 16 KiB (204 VPLs), and blocks must start at multiples of 256 bytes."""
+
+ROUNDINGS = 8
+"""Of a coordinate: what a VPL's surface and its map may be apart by, with positions and their products rounded."""
+
+
+@dataclass(frozen=True)
+class VplsMeta:
+    """What is known of a buffer of VPLs before it is filled.
+
+    params: parameters of the VPLs. bounces: most diffuse bounces of a path that makes one.
+    """
+
+    params: VplParams
+    bounces: int
+
+
+def describe_output(params: VplParams, bounces: int = 1) -> Output:
+    """Return the port of a buffer with room for `params.count` VPLs of each bounce."""
+    vpls = Buffer("vpl", params.count * bounces, VPL.itemsize, VPLS_PER_BLOCK, binding=BINDING)
+    return Output("VPLs in the order of their tiles", vpls, DEFINES, meta=VplsMeta(params, bounces))
+
+
+DEFINES = {"VPLS_BINDING": BINDING, "VPLS_PER_BLOCK": VPLS_PER_BLOCK}
+"""What readers of a buffer of VPLs need to know."""
+
+
+def pack_vpls(scene: Scene, vpls: Vpls, params: VplParams, tiles: Ints) -> np.ndarray:
+    """Return VPL records (n,). tiles: int (n,), of their maps in the atlas."""
+    records = np.zeros(len(vpls), VPL)
+    records["position"] = off_surface(scene, vpls.position, vpls.normal)
+    records["emission"], records["tile"] = vpls.emission, tiles
+    records["clamp_squared"] = (params.clamp_fraction * scene.geometry.diagonal) ** 2
+    records["one_minus_cos"] = one_minus_cos(params.fov)
+    fill_view(records, vpls.normal, params.fov)
+    return records
+
+
+def fill_view(records: np.ndarray, axis: Array, fov: float) -> None:
+    """Fill the axes and scales of views along unit `axis` (n, 3) into records (n,); fov: full angle, degrees."""
+    half = math.radians(fov) / 2
+    cosine = math.cos(half)
+    records["x_axis"], records["y_axis"], records["z_axis"] = make_axes(axis, fov)
+    records["tan_half"], records["curve"] = math.tan(half), cosine / (1 + cosine)
+
+
+def make_axes(axis: Array, fov: float) -> tuple[Array, Array, Array]:
+    """Return right, up and forward (n, 3) of views along unit `axis` (n, 3), fov degrees wide: x_axis, y_axis, z_axis.
+
+    Right and up are divided by the tangent of half the angle.
+    """
+    right, up = build_basis(axis)
+    tangent = math.tan(math.radians(fov) / 2)
+    return right / tangent, up / tangent, axis
+
+
+def read_vpls(records: np.ndarray) -> Vpls:
+    """Return the VPLs of VPL records (n,), positions and normals in the records' single precision."""
+    emission = records["emission"].astype(float)
+    return Vpls(records["position"], records["z_axis"], emission, np.arange(len(records)))
+
+
+def read_limits(records: np.ndarray) -> VplLimits:
+    """Return cone and clamp of the VPLs in VPL records (n,), n > 0, in the precision in which shaders read them."""
+    return VplLimits(clamp=math.sqrt(records["clamp_squared"][0]), cosine=1 - float(records["one_minus_cos"][0]))
+
+
+def off_surface(scene: Scene, position: Array, normal: Array) -> Array:
+    """Where VPLs stand, (n, 3): off their surfaces by its roundings, or their maps would show these here and there."""
+    size = np.maximum(np.abs(position).max(axis=1, keepdims=True), scene.geometry.scale)
+    lifted: Array = position + normal * (ROUNDINGS * 2.0**-24 * size)
+    return lifted
+
+
+class MapVersions:
+    """Versions of the shadow maps that a buffer's lights would have: a light's stays as long as its map would.
+
+    A map shows the same while the models stay and its light keeps pose and shape; how bright that is does not matter.
+    """
+
+    def __init__(self) -> None:
+        self._geometry: Geometry | None = None
+        self._shapes, self._versions = np.zeros((0, VPL.itemsize // 4), np.uint32), np.zeros(0, int)
+
+    def update(self, records: np.ndarray, scene: Scene) -> Ints:
+        """Return the versions (n,) of the next frame's lights, VPL records (n,)."""
+        lights = records.copy()
+        lights["emission"] = lights["clamp_squared"] = 0
+        shapes = lights.view(np.uint32).reshape(len(records), VPL.itemsize // 4)
+        both = min(len(shapes), len(self._shapes)) if self._geometry is scene.geometry else 0
+        same: Bools = np.zeros(len(shapes), bool)
+        same[:both] = (shapes[:both] == self._shapes[:both]).all(axis=1)
+        versions = new_versions(len(shapes))
+        versions[same] = self._versions[:both][same[:both]]
+        self._geometry, self._shapes, self._versions = scene.geometry, shapes, versions
+        return versions

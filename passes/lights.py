@@ -1,0 +1,54 @@
+"""Pack the scene's direct lights for the shaders: -> lights."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from deferred_ir.frame.direct_lights import LightVersions, describe_output, pack_lights
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.light_culling import AXES, LIGHTS_DROPPED, find_reaching, find_shining
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_buffer import make_axes
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Description, Output
+from deferred_ir.scene.scene import Scene
+
+
+class Lights(Pass):
+    """The direct lights, without the power of those that light nothing which the camera sees."""
+
+    State = LightVersions
+    figures = (LIGHTS_DROPPED,)
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """One buffer."""
+        del inputs
+        return {"lights": describe_output()}
+
+    def depends(self) -> frozenset[str]:
+        """The lights, and for the versions of their maps what moves in front of them."""
+        return frozenset({"light", "models"})
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Pack and upload."""
+        records = pack_lights(frame.scene)
+        versions = io.state.update(records, frame.scene)
+        if frame.by_view and find_shining(records).any():
+            reaches = find_reaching(_cones(frame.scene), frame.buffers.clusters, frame.scene.camera, frame.size)
+            records["emission"][~reaches] = 0
+            io.count(LIGHTS_DROPPED.name, int((~reaches).sum()))
+        io["lights"].write(records, versions)
+
+
+def _cones(scene: Scene) -> np.ndarray:
+    """Return the lights' cones as the pyramids about them, AXES (n,)."""
+    light = scene.spotlight
+    cones = np.zeros(1, AXES)
+    cones["position"] = light.position
+    cones["x_axis"], cones["y_axis"], cones["z_axis"] = make_axes(light.axis[None], light.fov)
+    return cones
+
+
+PASS = Lights

@@ -1,1 +1,1 @@
-"""Words that all rooms use: errors, arrays, versions, threads, checks of TOML tables."""
+"""What all rooms use: errors, array types, versions, threads, files, TOML tables, colour."""

@@ -1,4 +1,4 @@
-"""Names for the types that many signatures share."""
+"""Types that many signatures share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everything deferred-ir raises on purpose.
+"""The errors that deferred-ir raises on purpose.
 
     Error
     |-- SceneError      a scene file, model, texture or material
@@ -47,7 +47,7 @@ class OutputError(Error):
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """`; did you mean 'x'?` for the nearest of `known`, else `; known: a, b, c`."""
+    """Return `; did you mean 'x'?` for the nearest of `known`, else `; known: a, b, c`."""
     names = sorted(known)
     close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
     if close:
@@ -56,7 +56,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def format_value(value: Any) -> str:
-    """A value as an error message shows it: on one line and not too long."""
+    """Format a value for an error message: on one line, and shortened if it is long."""
     try:
         text = repr(value)
     except ValueError:  # Python writes no integers of more than 4300 digits

@@ -1,4 +1,4 @@
-"""Writing files whole or not at all, and looking beforehand whether they can be written."""
+"""Writes files whole or not at all, and checks beforehand that they can be written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ctrl-C that is never lost and breaks nothing.
+"""Ctrl-C that is never lost and interrupts no library halfway through its work.
 
 A KeyboardInterrupt is raised wherever the main thread happens to be. Some libraries catch BaseException around their
 own imports, and compiled ones may ignore an exception and go on with half of their tables. So the interrupt waits until
@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 RETRY = 0.02
-"""Seconds until the next look at where the main thread is."""
+"""Seconds until the handler looks again where the main thread is."""
 PATIENCE = 2.0
 """Seconds after which the interrupt is raised in a library, too, but never during an import."""
 _IMPORT = "<frozen importlib._bootstrap>"
@@ -23,7 +23,7 @@ _SAFE = ("deferred_ir", "__main__", "threading", "concurrent.futures")
 
 
 class _Handler:
-    """The handler of SIGINT, and of the timer that asks again."""
+    """The handler of SIGINT and of the timer that tries again."""
 
     def __init__(self) -> None:
         self.asked: float | None = None
@@ -52,10 +52,10 @@ def _safe(frame: FrameType | None) -> bool:
 
 @contextmanager
 def patient() -> Iterator[None]:
-    """Let SIGINT wait for a good moment inside; afterwards the handlers are as they were.
+    """Delay SIGINT within the context until it is safe to raise KeyboardInterrupt, then restore the handlers.
 
-    Nothing changes outside the main thread, where there are no timers to ask again (Windows), and where somebody else
-    handles SIGINT.
+    Nothing changes outside the main thread, on systems without interval timers (Windows), and where SIGINT has another
+    handler already.
     """
     main = threading.current_thread() is threading.main_thread()
     if (
@@ -73,5 +73,5 @@ def patient() -> Iterator[None]:
         signal.setitimer(signal.ITIMER_REAL, 0)
         for number, old in before.items():
             signal.signal(number, old)
-    if handler.asked is not None:  # it was still waiting
+    if handler.asked is not None:  # an interrupt was still waiting
         raise KeyboardInterrupt

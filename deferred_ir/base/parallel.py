@@ -1,4 +1,4 @@
-"""Work on threads with the results in order, so that sums do not depend on the number of threads."""
+"""Runs tasks on threads and returns results in order, so that sums do not depend on the number of threads."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ Task = TypeVar("Task")
 Result = TypeVar("Result")
 
 AHEAD = 4
-"""Tasks begun for each thread before their results are taken: enough to keep all busy, with few results in memory."""
+"""Tasks in flight for each thread: enough to keep all busy, with few results in memory."""
 
 
 def run_in_order(
     function: Callable[[Task], Result], tasks: Iterable[Task], threads: int | None = None
 ) -> Generator[Result, None, None]:
-    """`function` of each task, one after the other; on `threads` threads, None for as many as the machine has.
+    """Yield the result of `function` for each task, in the order of the tasks.
 
-    Close it (contextlib.closing) where the loop over it may end early: what has not begun is then dropped.
+    threads: how many work at the same time, None for as many as the machine has. Close the generator
+    (contextlib.closing) where a loop over it may end early: tasks that have not begun are then cancelled.
     """
     threads = threads or os.cpu_count() or 1
     waiting: deque[Future[Result]] = deque()

@@ -1,4 +1,4 @@
-"""Checking of tables that came out of a TOML file: each fault is noted with its key, and all are reported at once."""
+"""Reads TOML files and checks their tables: each fault is noted with its key, and all are reported at once."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from deferred_ir.base.errors import Error, SceneError, did_you_mean, format_valu
 LARGEST = 1e18
 """Larger numbers are refused: their squares would overflow 32-bit floats."""
 MOST = 20
-"""Faults that one message lists."""
+"""Most faults that one message lists."""
 EXAMPLES = {2: "[0.0, 0.0]", 3: "[0.0, 0.0, 0.0]", 4: "[0, 0, 0, 1]"}
-"""Vectors to show, by length; four numbers are a quaternion, of which zeros are none."""
+"""Example vectors for messages, by length. Four numbers are a quaternion, which must not be zero."""
 
 DEEPEST = 32
 """Most levels of tables and arrays in a file; Python's own functions on nested values end at some hundreds."""
@@ -46,7 +46,7 @@ def _is_too_deep(value: Any) -> bool:
 
 
 class Faults:
-    """Faults found in one file so far."""
+    """The faults found in one file so far."""
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -64,16 +64,16 @@ class Faults:
 
 
 class Table:
-    """One TOML table. Its methods take a key, check the value, and note a fault where it does not fit.
+    """One TOML table. Its methods check the value of a key and note a fault where it does not fit.
 
-    After a fault they return None (the default, if one is given): `Faults.found` tells in the end whether to go on.
+    After a fault they return None, or the default if there is one; `Faults.found` holds all that was noted.
     """
 
     def __init__(self, faults: Faults, name: str, data: Mapping[str, Any], known: tuple[str, ...]) -> None:
         self.faults, self.name, self.data = faults, name, data
         for key in data:
             if key not in known:
-                # Looking for what was meant takes time, and no more than MOST are shown.
+                # Finding the nearest key takes time, and no more than MOST faults are shown.
                 hint = did_you_mean(key, known) if len(faults.found) < MOST else ""
                 self.fault(key, f"unknown key{hint}")
 
@@ -82,7 +82,7 @@ class Table:
         self.faults.add(f"{self.name}.{key}" if self.name else key, what)
 
     def _missing(self, key: str, needed: bool, mend: str = "") -> bool:
-        """Whether the file lacks `key`; a fault where it is needed, with what to give."""
+        """Return whether the table lacks `key`, and note a fault if it is needed. mend: what to give."""
         if key in self.data:
             return False
         if needed:
@@ -90,7 +90,7 @@ class Table:
         return True
 
     def table(self, key: str, known: tuple[str, ...]) -> Table | None:
-        """The table `key` within this one, if there is one."""
+        """Return the table `key` within this one, if there is one."""
         if self._missing(key, needed=False):
             return None
         value = self.data[key]
@@ -100,7 +100,7 @@ class Table:
         return Table(self.faults, f"{self.name}.{key}" if self.name else key, value, known)
 
     def string(self, key: str, needed: bool = False, mend: str = "") -> str | None:
-        """A string that is not empty; mend: what to give where it is missing."""
+        """Return a string that is not empty. mend: what to give where it is missing."""
         if self._missing(key, needed, mend):
             return None
         value = self.data[key]
@@ -110,7 +110,7 @@ class Table:
         return value
 
     def integer(self, key: str) -> int | None:
-        """An integer of 0 or more."""
+        """Return an integer of 0 or more."""
         if self._missing(key, needed=False):
             return None
         value = self.data[key]
@@ -120,7 +120,7 @@ class Table:
         return value
 
     def number(self, key: str, default: float) -> float:
-        """A finite number."""
+        """Return a finite number."""
         if self._missing(key, needed=False):
             return default
         value = check_number(self.data[key])
@@ -130,7 +130,7 @@ class Table:
         return value
 
     def vector(self, key: str, length: int = 3, needed: bool = True) -> tuple[float, ...] | None:
-        """`length` finite numbers."""
+        """Return `length` finite numbers."""
         if self._missing(key, needed, f"{length} numbers such as {EXAMPLES[length]}"):
             return None
         value = check_vector(self.data[key], length)
@@ -140,12 +140,12 @@ class Table:
         return value
 
     def vec3(self, key: str, needed: bool = True) -> Vec3 | None:
-        """Three finite numbers."""
+        """Return three finite numbers."""
         value = self.vector(key, 3, needed)
         return None if value is None else (value[0], value[1], value[2])
 
     def times(self) -> tuple[float, ...] | None:
-        """The array `times` of a motion: at least one finite number, ascending."""
+        """Return the array `times` of a motion: at least one finite number, ascending."""
         if self._missing("times", needed=True, mend="seconds such as [0, 2]"):
             return None
         raw = self.data["times"]
@@ -162,7 +162,7 @@ class Table:
         return times
 
     def vectors(self, key: str, length: int, times: tuple[float, ...] | None) -> list[tuple[float, ...]] | None:
-        """An array of vectors, one for each of `times`."""
+        """Return an array of vectors, one for each of `times`."""
         if self._missing(key, needed=True, mend=f"one for each time, such as {EXAMPLES[length]}"):
             return None
         raw = self.data[key]
@@ -182,13 +182,13 @@ class Table:
         return result
 
     def vec3s(self, key: str, times: tuple[float, ...] | None) -> tuple[Vec3, ...] | None:
-        """An array of triples, one for each of `times`."""
+        """Return an array of triples, one for each of `times`."""
         rows = self.vectors(key, 3, times)
         return None if rows is None else tuple((x, y, z) for x, y, z in rows)
 
 
 def check_number(value: Any) -> float | str:
-    """`value` as a float, or what is wrong with it."""
+    """Return `value` as a float, or say what is wrong with it."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f"must be a number, not {format_value(value)}"
     if isinstance(value, float) and not math.isfinite(value):
@@ -199,7 +199,7 @@ def check_number(value: Any) -> float | str:
 
 
 def check_vector(value: Any, length: int) -> tuple[float, ...] | str:
-    """`value` as `length` floats, or what is wrong with it."""
+    """Return `value` as `length` floats, or say what is wrong with it."""
     if not isinstance(value, list) or len(value) != length:
         return f"must be {length} numbers such as {EXAMPLES[length]}, not {format_value(value)}"
     result = []

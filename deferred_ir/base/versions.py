@@ -1,4 +1,4 @@
-"""Numbers that tell whether something is still what it was: a new one for whatever is new, never the same twice."""
+"""Process-wide unique version numbers; a resource takes a new one whenever its contents change."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _numbers = itertools.count(1)
 
 
 def new_version() -> int:
-    """A number that no other thing has; above 0."""
+    """Return a version number above 0 that was never given out before."""
     return next(_numbers)
 
 
 def new_versions(count: int) -> Ints:
-    """So many of them, int (count,)."""
+    """Return `count` new version numbers, int (count,)."""
     return np.fromiter(_numbers, np.int64, count)

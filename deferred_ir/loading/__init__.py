@@ -1,1 +1,1 @@
-"""Files to scenes."""
+"""Loads scenes from files."""

@@ -1,4 +1,4 @@
-"""Chooses a camera or a spotlight for a scene that has none.
+"""Chooses a camera or a spotlight for a scene without one.
 
 Inside and looking across where rays from the middle meet surfaces nearly all around, else from outside. The light's E
 makes the mean direct irradiance of what the camera sees 1. Everything is deterministic; +y is up.
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 UP = np.array([0.0, 1.0, 0.0])
 ENCLOSED = 0.75
-"""A point is inside where this part of the rays from it meets a surface: an open side of a box (5/6) still counts."""
+"""A point is inside if at least this fraction of rays from it hit a surface: a box with an open side (5/6) counts."""
 ROOMY = 0.03
-"""A point with a surface nearer than this part of the scene's diagonal is a gap between things and no room."""
+"""A point with a surface nearer than this fraction of the scene's diagonal is in a gap, not in a room."""
 SOLID = 0.75
-"""A point is within a solid where this part of the surfaces around it shows it their backs."""
+"""A point is within a solid if this fraction of the surfaces around it face away."""
 INSIDE_FOV, OUTSIDE_FOV, ROOM_LIGHT_FOV = 75.0, 45.0, 120.0
 VIEW_FROM = np.array([0.55, 0.45, 1.0])
 """Direction from the middle to a camera outside: a three-quarter view."""
@@ -35,7 +35,7 @@ MARGIN = 1.1
 
 
 def choose_views(scene: Scene, camera: bool, spotlight: bool) -> Scene:
-    """`scene` with its camera and its spotlight replaced by chosen ones, as the two flags say; fills Scene.chosen."""
+    """Return `scene` with its camera, its spotlight or both replaced by chosen ones; fills Scene.chosen."""
     if not (camera or spotlight):
         return scene
     near, reasons = _choose_by_rays(recentre(scene.at(0)), camera, spotlight)
@@ -46,7 +46,7 @@ def choose_views(scene: Scene, camera: bool, spotlight: bool) -> Scene:
 
 
 def _choose_by_rays(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scene, dict[str, str]]:
-    """The scene, which lies near the origin, with what was chosen, and why each thing was."""
+    """Return the scene, which must lie near the origin, with what was chosen, and why, by name."""
     from deferred_ir.rays.tracer import Tracer
 
     try:
@@ -67,7 +67,7 @@ def _choose_by_rays(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scene,
 
 
 def _choose_by_bounds(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scene, dict[str, str]]:
-    """The choice where no rays can be traced."""
+    """Choose views from the bounds alone, where no rays can be traced."""
     reasons = {}
     if camera:
         reasons["camera"] = "from outside, framing the whole: without embreex no rays tell what is inside"
@@ -79,7 +79,7 @@ def _choose_by_bounds(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scen
 
 
 def _describe(item: Camera | Spotlight, why: str) -> dict[str, Any]:
-    """What JSON can hold of a camera or a spotlight."""
+    """Return a camera or a spotlight as values that JSON can hold."""
     keys = ("position", "look_at", "up", "fov", "emission", "radius")
     values = {key: getattr(item, key) for key in keys if hasattr(item, key)}
     return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()} | {"why": why}
@@ -96,7 +96,7 @@ def _normalise(vector: Array) -> Array:
 
 
 def _spread_over_sphere(count: int) -> Array:
-    """Directions spread evenly over the sphere (a Fibonacci lattice), float64 (count, 3)."""
+    """Return directions spread evenly over the sphere (a Fibonacci lattice), float64 (count, 3)."""
     index = np.arange(count) + 0.5
     y = 1 - 2 * index / count
     angle, ring = np.pi * (1 + 5**0.5) * index, np.sqrt(1 - y * y)
@@ -104,7 +104,7 @@ def _spread_over_sphere(count: int) -> Array:
 
 
 def _measure_distances(tracer: Tracer, origins: Array, directions: Array) -> tuple[Array, Array]:
-    """How far rays (n, 3), (n, 3) go (infinite for a miss), and how much the faces they meet look at them (-1 to 1)."""
+    """Return how far rays (n, 3), (n, 3) go, infinite for a miss, and the cosines of the faces that they hit."""
     hits = tracer.closest(origins, directions)
     way = np.where(hits.hit, np.linalg.norm(hits.position - origins, axis=1), np.inf)
     facing = -(tracer.scene.geometry.face_normals[hits.face] * directions).sum(axis=1)
@@ -112,7 +112,7 @@ def _measure_distances(tracer: Tracer, origins: Array, directions: Array) -> tup
 
 
 def _measure_clearances(tracer: Tracer, points: Array) -> Array:
-    """How far away the nearer surfaces around `points` (n, 3) are; negative for points that are not inside a room."""
+    """Return the distances of the nearer surfaces around `points` (n, 3); negative for points outside rooms."""
     directions = _spread_over_sphere(128)
     origins = np.repeat(points, len(directions), axis=0)
     way, facing = _measure_distances(tracer, origins, np.tile(directions, (len(points), 1)))
@@ -127,9 +127,9 @@ def _measure_clearances(tracer: Tracer, points: Array) -> Array:
 
 
 def _find_room_middle(tracer: Tracer) -> Array | None:
-    """The point in the middle of the largest room, or None where nothing is a room.
+    """Find the point in the middle of the largest room, or None if there is no room.
 
-    The middle of the bounding box is tried first; it may lie in a table or a column, so points around it are, too.
+    The middle of the bounding box may lie in a table or a column, so points around it are tried, too.
     """
     low, high = tracer.scene.geometry.bounds
     steps = np.array([0.5, 0.35, 0.65, 0.2, 0.8])
@@ -141,7 +141,7 @@ def _find_room_middle(tracer: Tracer) -> Array | None:
 
 
 def _find_seen_middle(tracer: Tracer, camera: Camera) -> Array | None:
-    """The point half way to what a given camera looks at, or None where that is not inside a room."""
+    """Return the point half way to what a camera looks at, or None if that is not inside a room."""
     position, forward = np.array(camera.position), camera.axes[2]
     way, _ = _measure_distances(tracer, position[None], forward[None])
     if not np.isfinite(way[0]):
@@ -151,7 +151,7 @@ def _find_seen_middle(tracer: Tracer, camera: Camera) -> Array | None:
 
 
 def _measure_free_way(tracer: Tracer, point: Array, directions: Array) -> Array:
-    """How far one can go from `point` along `directions` (n, 3) before a surface, or before leaving the bounds."""
+    """Return how far it is from `point` along `directions` (n, 3) to a surface or out of the bounds, (n,)."""
     low, high = tracer.scene.geometry.bounds
     with np.errstate(divide="ignore", invalid="ignore"):
         exits = np.where(directions > 0, (high - point) / directions, (low - point) / directions)
@@ -162,7 +162,7 @@ def _measure_free_way(tracer: Tracer, point: Array, directions: Array) -> Array:
 
 
 def _choose_inside_camera(tracer: Tracer, middle: Array) -> Camera:
-    """From near a wall, through the middle, in the level direction that shows the most of the room."""
+    """Choose a camera near a wall that looks through the middle in the level direction that shows most of the room."""
     angles = np.arange(24) * (2 * np.pi / 24)
     forwards = np.stack([np.sin(angles), np.zeros(24), -np.cos(angles)], axis=-1)
     positions = middle - forwards * 0.9 * _measure_free_way(tracer, middle, -forwards)[:, None]
@@ -179,7 +179,7 @@ def _choose_inside_camera(tracer: Tracer, middle: Array) -> Camera:
 
 
 def _make_outside_camera(scene: Scene) -> Camera:
-    """A three-quarter view from above that holds all corners of the bounds, with a margin."""
+    """Make a three-quarter view from above that shows all corners of the bounds, with a margin."""
     low, high = scene.geometry.bounds
     centre = (low + high) / 2
     towards = _normalise(VIEW_FROM)
@@ -191,7 +191,7 @@ def _make_outside_camera(scene: Scene) -> Camera:
 
 
 def _make_room_lights(tracer: Tracer, camera: Camera, middle: Array) -> list[Spotlight]:
-    """Lights at several places in the air, looking down and a little along the camera's view."""
+    """Make lights at several places in the air that look down and a little along the camera's view."""
     position, forward = np.array(camera.position), camera.axes[2]
     way = _measure_free_way(tracer, position, forward[None])[0]
     grounds = [middle, *(position + forward * way * part for part in (0.25, 0.5, 0.75))]
@@ -210,7 +210,7 @@ def _make_room_lights(tracer: Tracer, camera: Camera, middle: Array) -> list[Spo
 
 
 def _make_outside_light(scene: Scene) -> Spotlight:
-    """Above the camera's side, aimed at the middle, with a cone that covers the bounds."""
+    """Make a light above the camera's side, aimed at the middle, with a cone that covers the bounds."""
     centre, radius = scene.geometry.bounds.mean(axis=0), scene.geometry.diagonal / 2
     side = np.subtract(scene.camera.position, centre) * (1, 0, 1)
     length = np.linalg.norm(side)
@@ -231,9 +231,9 @@ def _square_light_distance(scene: Scene) -> float:
 
 
 def _choose_light(tracer: Tracer, camera: Camera, lights: list[Spotlight]) -> tuple[Spotlight, str]:
-    """The one of `lights` that lights most of what the camera sees, with E for a mean irradiance of 1, and why.
+    """Return the one of `lights` that lights what the camera sees most evenly, and why it was chosen.
 
-    Where none lights anything, a light at the camera does.
+    Its E gives a mean irradiance of 1. If no light reaches anything visible, one at the camera is chosen.
     """
     lit = _find_best_light(tracer, camera, lights)
     if lit is not None:
@@ -266,7 +266,7 @@ def _find_best_light(tracer: Tracer, camera: Camera, lights: list[Spotlight]) ->
 
 
 def _compute_irradiance(tracer: Tracer, points: Array, normals: Array, light: Spotlight) -> Array:
-    """Direct irradiance (n,) at `points` (n, 3) under `light` with E = 1, shadows included."""
+    """Return the direct irradiance (n,) at `points` (n, 3) under `light` with E = 1, with shadows."""
     origin = np.array(light.position)
     way = points - origin
     distance = np.maximum(np.linalg.norm(way, axis=1), tracer.offset)

@@ -1,4 +1,4 @@
-"""`load`: from the name of a built-in scene, a scene file or a model file to a `Scene`."""
+"""Loads a `Scene` from the name of a built-in scene, a scene file or a model file."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from deferred_ir.scene.scene import Scene
 
 ANY_CAMERA = Camera((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
 ANY_LIGHT = Spotlight((0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
-"""Stand-ins until `fit` has chosen."""
+"""Placeholders until default_views has chosen."""
 
 
 def builtin_scenes() -> tuple[tuple[str, str], ...]:
-    """Name and one-line description of each built-in scene, by name; the description is its file's first comment."""
+    """Return name and description of each built-in scene, by name; the description is its file's first comment."""
     return tuple((path.stem, _read_description(path)) for path in sorted(_find_folder().glob("*.toml")))
 
 
@@ -54,7 +54,7 @@ def load(scene: str | os.PathLike[str]) -> Scene:
 
 
 def _read_model(entry: ModelEntry, path: Path, index: int, count: int) -> ModelData:
-    """The model of an entry; an error says which entry of which scene file names it."""
+    """Read the model of an entry; an error says which entry of which scene file names it."""
     try:
         return models.read(entry.path, entry.scale, entry.translate, root=path.parent)
     except SceneError as error:
@@ -76,7 +76,7 @@ def _read_description(path: Path) -> str:
 
 
 def _find_file(name: str) -> Path:
-    """The file that `name` means; a built-in name wins over a file of that name."""
+    """Return the file that `name` means; a built-in name wins over a file of that name."""
     names = [path.stem for path in _find_folder().glob("*.toml")]
     if name in names:
         return _find_folder() / f"{name}.toml"

@@ -17,7 +17,7 @@ from deferred_ir.scene.scene import Material, Texture
 def merge(
     models: Sequence[tuple[ModelData, ModelMotion | None]], file: str
 ) -> tuple[Geometry, tuple[Material, ...], tuple[Texture, ...], tuple[Model, ...]]:
-    """Geometry, materials, textures and vertex ranges of all models; `file` is what an error message names.
+    """Join all models to geometry, materials, textures and vertex ranges; `file` is what an error message names.
 
     Equal materials and equal images become one. Vertices stay in the order of models and parts; faces are sorted by
     texture, otherwise in that order too. Raises SceneError where everything lies in one point.
@@ -61,7 +61,7 @@ def merge(
 
 
 def _join(parts: list[Part], pick: Callable[[Part], Array | None], filler: Array) -> Array | None:
-    """What `pick` takes of all parts, float32, with rows of `filler` where a part has none; None if no part has any."""
+    """Join the arrays that `pick` returns for parts, float32, `filler` rows for None; None if all are None."""
     picked = [pick(part) for part in parts]
     if all(array is None for array in picked):
         return None

@@ -1,4 +1,4 @@
-"""What is read from a model file, whatever its format."""
+"""The contents of a model file, whatever its format."""
 
 from __future__ import annotations
 

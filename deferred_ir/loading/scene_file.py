@@ -1,4 +1,4 @@
-"""Reads the TOML scene file into plain checked values; docs/scene-file.md says what the keys mean.
+"""Reads TOML scene files into plain checked values; docs/scene-file.md says what the keys mean.
 
 Nothing of the file is run, and no model is opened here.
 """
@@ -33,7 +33,7 @@ NAME = re.compile(r"[^/\\%\x00-\x1f\x7f]{1,100}")
 
 @dataclass(frozen=True)
 class ModelEntry:
-    """One [[model]]: the file (resolved against the scene file's folder), `scale`, then `translate`."""
+    """One [[model]]: its file (resolved against the scene file's folder), `scale`, then `translate`."""
 
     path: Path
     scale: float = 1.0
@@ -43,7 +43,7 @@ class ModelEntry:
 
 @dataclass(frozen=True)
 class SceneFile:
-    """What a scene file says; camera and spotlight are None where it leaves them out."""
+    """The contents of a scene file; camera and spotlight are None where it leaves them out."""
 
     name: str
     models: tuple[ModelEntry, ...]
@@ -194,7 +194,7 @@ def _read_fov(table: Table, default: float) -> float:
 
 
 def _check_view(table: Table, key: str, position: Vec3, look_at: Vec3, up: Vec3 | None = None) -> None:
-    """Note a fault where the view has no direction, or `up` lies along it; `key` is where the view stands."""
+    """Note a fault if the view has no direction, or `up` lies along it. key: that of look_at."""
     fault = view_fault(position, look_at, up)
     if fault:
         name, why = fault

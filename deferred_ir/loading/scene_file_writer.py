@@ -1,4 +1,4 @@
-"""Writes TOML scene files: what scene_file.py reads from them is what was written."""
+"""Writes TOML scene files that scene_file.py reads back as they were."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def write_toml(path: Path, tables: Mapping[str, Any], comment: str = "") -> None
 
 
 def make_tables(scene: SceneFile) -> dict[str, Any]:
-    """Build the tables of a scene file, without those of what is None."""
+    """Build the tables of a scene file, without those that are None."""
     tables = {
         "name": scene.name,
         "model": [_make_model(entry) for entry in scene.models],

@@ -1,4 +1,4 @@
-"""Decoding of image textures, by PIL."""
+"""Decodes image textures with PIL."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Triangles in clusters with bounding boxes, and which of them each light's map may show. No OpenGL."""
+"""Clusters of triangles with bounding boxes, and which of them each light's map may show. No OpenGL."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from deferred_ir.base.arrays import Array, Bools, Ints
 CLUSTER = 64
 """Most triangles in a cluster."""
 OCTAVES = 10
-"""Triangles share a cluster whose longest edges are in one octave, down to 2^-OCTAVES of the longest of all."""
+"""The longest edges of a cluster's triangles lie in one octave, down to 2^-OCTAVES of the longest of all."""
 ROUNDING = 2.0**-18
 """Slack of the test against a plane, relative to the terms it adds: 64 roundings, this test's and the shader's."""
 
@@ -19,18 +19,17 @@ EVERY = slice(None)
 
 
 class Clusters:
-    """Faces (F, 3) of `positions` (V, 3), grouped by where they are, and by `groups` (F,) if these are given.
+    """Faces (F, 3) of `positions` (V, 3), clustered by place, by size and, if there are any, by `groups` (F,).
 
     order: int (F,), the faces of cluster 0, then of cluster 1, ... starts: int (C + 1,), where in `order` each begins.
-    reach: largest coordinate, without its sign.
-    A group is a range of clusters: those of lower numbers come first.
+    reach: the largest absolute coordinate. The clusters of a group are consecutive, groups in ascending order.
     """
 
     def __init__(self, positions: Array, faces: Ints, most: int = CLUSTER, groups: Ints | None = None) -> None:
         corners = positions.astype(np.float32)[faces]
         low, high = corners.min(axis=1), corners.max(axis=1)
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-        # Triangles of like size together: one large triangle would make its cluster bend in more maps than its own.
+        # Group triangles of similar size: one large triangle would make its whole cluster count as bent.
         classes = _classify(edges)
         if groups is not None:
             classes += groups * (OCTAVES + 1)
@@ -41,7 +40,7 @@ class Clusters:
         self._set_boxes(slice(0, len(first)), low[self.order], high[self.order])
 
     def _set_boxes(self, chosen: slice, low: Array, high: Array) -> None:
-        """Put boxes about the clusters `chosen`; low, high (n, 3): of their faces, in order."""
+        """Set the boxes of the clusters `chosen`; low, high: corners (n, 3) of their faces' boxes, in order."""
         at = self.starts[chosen] - self.starts[chosen.start]
         low, high = np.minimum.reduceat(low, at), np.maximum.reduceat(high, at)
         centre = low / 2 + high / 2
@@ -49,9 +48,9 @@ class Clusters:
         self.reach = float((np.abs(self._boxes[:3]) + self._boxes[3:6]).max())
 
     def move(self, chosen: slice, corners: Array) -> None:
-        """Let the clusters `chosen` follow their triangles, whose corners are (n, 3, 3) in their order, float32.
+        """Update the boxes of the clusters `chosen` after a rigid motion of their triangles.
 
-        Triangles have to be what they were, but for a rigid motion.
+        corners: float32 (n, 3, 3), of the triangles in order.
         """
         self._set_boxes(chosen, corners.min(axis=1), corners.max(axis=1))
 
@@ -60,14 +59,14 @@ class Clusters:
 
     @property
     def sizes(self) -> Ints:
-        """Triangles of each cluster, int (C,)."""
+        """Number of triangles of each cluster, int (C,)."""
         return np.diff(self.starts)
 
     def find_visible(self, lights: np.ndarray, *, hemisphere: bool = False) -> Bools:
-        """Which clusters may show in the maps of `lights`, LIGHT records (n,): bool (n, C).
+        """Find the clusters that may show in the maps of `lights`, LIGHT records (n,): bool (n, C).
 
-        A map shows what lies inside its pyramid; with `hemisphere` all that is in front of the light. A cluster that is
-        left out lies outside by more than roundings can move it, so its triangles would have covered no texel.
+        A map shows its pyramid; with `hemisphere`, everything in front of the light. A culled cluster lies outside by
+        more than rounding errors, so its triangles would have covered no texel.
         """
         if len(self) == 1:
             return np.ones((len(lights), 1), bool)
@@ -76,10 +75,10 @@ class Clusters:
     def find_within(
         self, lights: np.ndarray, *, hemisphere: bool = False, margin: float = 0.0, only: Ints | slice = EVERY
     ) -> Bools:
-        """Which clusters, or which of `only`, may lie in the lights' pyramids or less than `margin` outside: (n, C)."""
+        """Find the clusters, or those of `only`, that may be in the lights' pyramids or `margin` outside: (n, C)."""
         x, y, z = (lights[axis] for axis in ("x_axis", "y_axis", "z_axis"))
         position = lights["position"]
-        # What the dot products here and in the shader add up is no larger than this.
+        # An upper bound of the terms that the dot products here and in the shader add up.
         terms = (np.abs(x) + np.abs(y) + np.abs(z)).sum(axis=1) * (self.reach + np.abs(position).max(axis=1))
         slack = terms * np.float32(ROUNDING)
         boxes = self._boxes[:, only]
@@ -93,11 +92,11 @@ class Clusters:
         return ~outside
 
     def find_drawn(self, lights: np.ndarray) -> Bools:
-        """Which clusters make up the scene for each of `lights`, LIGHT records (n,), culled or not: bool (n, C)."""
+        """Find the clusters that make up the scene for `lights`, LIGHT records (n,), before culling: bool (n, C)."""
         return np.ones((len(lights), len(self)), bool)
 
     def find_bent(self, lights: np.ndarray, reach: Array) -> Bools:
-        """Which clusters have an edge that may be closer to a light than `reach` (n,) times its length: bool (n, C)."""
+        """Find the clusters with an edge that may be nearer to a light than `reach` (n,) times its length, (n, C)."""
         centre, half = self._boxes[:3], self._boxes[3:6]
         away = np.maximum(np.abs(lights["position"][:, :, None] - centre) - half, 0)
         bent: Bools = (away**2).sum(axis=1) < (reach[:, None] * self._longest) ** 2
@@ -105,7 +104,7 @@ class Clusters:
 
 
 def _classify(edges: Array) -> Ints:
-    """Class of each triangle by its longest edge (F,): halves of the longest of all, down to 2^-OCTAVES."""
+    """Return the octave of each longest edge (F,) below the longest of all, from 0 down to -OCTAVES."""
     longest = edges.max()
     shares = edges / longest if longest > 0 else edges
     classes: Ints = np.ceil(np.log2(np.maximum(shares, 2.0**-OCTAVES))).astype(np.intp)
@@ -113,9 +112,9 @@ def _classify(edges: Array) -> Ints:
 
 
 def split_points(points: Array, classes: Ints, most: int) -> tuple[Ints, Ints]:
-    """Halve the `points` (n, 3) of each class across their longest extent until no part has more than `most`.
+    """Halve the `points` (n, 3) of each class across their longest extent until no set has more than `most`.
 
-    Returns order (n,) and starts.
+    Returns the order of the points, (n,), and where in it each set starts, with the end.
     """
     order = np.argsort(classes, kind="stable")
     bounds = [0, *(np.flatnonzero(np.diff(classes[order])) + 1).tolist(), len(points)]
@@ -126,7 +125,7 @@ def split_points(points: Array, classes: Ints, most: int) -> tuple[Ints, Ints]:
             starts.append(start)
             continue
         part = points[order[start:end]]
-        # Whole clusters on the left: then all but the last are full.
+        # Multiples of `most` go to the left, so that all sets but the last are full.
         middle = -(-(end - start) // (2 * most)) * most
         axis = np.ptp(part, axis=0).argmax()
         order[start:end] = order[start:end][np.argpartition(part[:, axis], middle - 1)]

@@ -1,7 +1,7 @@
-"""A scene's triangles at several levels of detail: each map draws of each part what its texels can tell. No OpenGL.
+"""Levels of detail of a scene's triangles: each map draws each chunk as coarsely as its texels allow. No OpenGL.
 
-The scene is cut into chunks, each simplified on its own (proxy.py). Where chunks meet their vertices stay, so chunks of
-different levels fit together without a gap, and each light may choose by its distance from each chunk.
+The scene is cut into chunks, each simplified on its own (simplify.py). Vertices that chunks share stay, so chunks of
+different levels fit together without a gap, and each light chooses a level by its distance from each chunk.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from deferred_ir.scene.geometry import Geometry
 CHUNK = 2048
 """Most triangles in a chunk: large enough that few vertices lie where chunks meet."""
 COARSEST = 0.01
-"""Largest deviation of a level, as a share of the scene's diagonal; the one before is a third of it, and so on."""
+"""Deviation of the coarsest level as a fraction of the scene's diagonal; each finer level has a third of the next."""
 LEVELS = 5
 
 _known: WeakKeyDictionary[Geometry, Levels] = WeakKeyDictionary()
@@ -29,10 +29,11 @@ _known: WeakKeyDictionary[Geometry, Levels] = WeakKeyDictionary()
 
 @dataclass(frozen=True)
 class Levels:
-    """faces (F, 3) of all levels, on the scene's vertices; level and chunk (F,) of each.
+    """The levels of detail of a scene.
 
-    deviations: (L,), of the levels, from 0, in world units. boxes: (2, C, 3), corners of the chunks; those of moving
-    models are not placed. No chunk has triangles of two models that move apart.
+    faces: (F, 3), of all levels, on the scene's vertices. level, chunk: (F,), of each face. deviations: (L,), of the
+    levels, ascending from 0, in world units. boxes: (2, C, 3), corners of the chunks, in moving models' own
+    coordinates where they belong to one. No chunk has triangles of two models that move independently.
     """
 
     faces: Ints
@@ -43,21 +44,21 @@ class Levels:
 
 
 def find_levels(geometry: Geometry) -> Levels:
-    """The levels of a scene: some seconds for 100,000 triangles, once in a process."""
+    """Return a scene's levels; building them takes some seconds for 100,000 triangles, once in a process."""
     if geometry not in _known:
         _known[geometry] = _build_levels(geometry)
     return _known[geometry]
 
 
 def make_mesh(geometry: Geometry) -> MapMesh:
-    """The triangles of all levels."""
+    """Make the mesh of the triangles of all levels."""
     return replace(MapMesh.from_geometry(geometry), faces=find_levels(geometry).faces)
 
 
 def _build_levels(geometry: Geometry) -> Levels:
     positions = MapMesh.from_geometry(geometry).local.astype(np.float32)
     faces = np.empty_like(geometry.faces)
-    for group in range(1 + len(geometry.moving)):  # what moves apart is not one, where it touches at rest
+    for group in range(1 + len(geometry.moving)):  # models stay apart where they touch at rest
         own = np.flatnonzero(geometry.groups == group)
         faces[own] = weld_vertices(positions, geometry.faces[own])
     corners = positions[faces]
@@ -82,9 +83,9 @@ def _build_levels(geometry: Geometry) -> Levels:
 
 
 class LevelClusters(Clusters):
-    """Clusters of all levels; a light draws each chunk at the coarsest level that it may.
+    """Clusters of all levels; a light draws each chunk at the coarsest level within its tolerance.
 
-    tolerance: gives for LIGHT records (n,) how far a level may be off at most, in distances of surface and light, (n,).
+    tolerance: returns for LIGHT records (n,) the largest deviation, (n,), as a fraction of the distance from the light.
     """
 
     def __init__(self, mesh: MapMesh, detail: Levels, tolerance: Callable[[np.ndarray], Array]) -> None:
@@ -96,7 +97,7 @@ class LevelClusters(Clusters):
         self._detail, self._tolerance, self._chunks = detail, tolerance, detail.boxes.copy()
 
     def move(self, chosen: slice, corners: Array) -> None:
-        """As in Clusters; the boxes of chunks, by which levels are chosen, follow."""
+        """Update the boxes of clusters, as in Clusters, and of chunks, by which levels are chosen."""
         super().move(chosen, corners)
         faces = self.order[self.starts[chosen.start] : self.starts[chosen.stop]]
         finest = self._detail.level[faces] == 0
@@ -107,11 +108,11 @@ class LevelClusters(Clusters):
         np.maximum.at(high, chunk, corners.max(axis=1))
 
     def find_visible(self, lights: np.ndarray, *, hemisphere: bool = False) -> Bools:
-        """As in Clusters, of the levels that the lights draw."""
+        """Find the clusters that may show, as in Clusters, among the levels that the lights draw."""
         return super().find_visible(lights, hemisphere=hemisphere) & self.find_drawn(lights)
 
     def find_drawn(self, lights: np.ndarray) -> Bools:
-        """Which clusters make up the scene for each of `lights`, LIGHT records (n,): bool (n, C)."""
+        """Find the clusters of the levels that `lights`, LIGHT records (n,), draw of each chunk: bool (n, C)."""
         position = lights["position"][:, None].astype(np.float64)
         low, high = self._chunks
         away = np.maximum(np.maximum(low - position, position - high), 0)

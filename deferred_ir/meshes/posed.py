@@ -1,4 +1,4 @@
-"""Meshes that maps show, in clusters that follow the models that move. No OpenGL."""
+"""The meshes that shadow maps draw, in clusters that follow moving models. No OpenGL."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from deferred_ir.scene.geometry import Geometry, find_groups, find_middle, trans
 
 @dataclass(frozen=True, eq=False)
 class MapMesh:
-    """Triangles that maps show: positions (V, 3), faces (F, 3), and whose vertices move, all at rest."""
+    """Triangles that maps draw, at rest: positions (V, 3), faces (F, 3), and the vertices of each moving model."""
 
     positions: Array
     faces: Ints
@@ -22,12 +22,12 @@ class MapMesh:
 
     @cached_property
     def groups(self) -> Ints:
-        """Whose each face is, int (F,): 0 of what stands still, i + 1 of moving model i."""
+        """Which model moves each face, int (F,): 0 for none, i + 1 for moving model i."""
         return find_groups(self.faces, self.moving)
 
     @cached_property
     def local(self) -> Array:
-        """Positions, those of each moving model about its own middle: 32 bits are finest there."""
+        """Positions, those of moving models relative to their middles, where 32-bit floats are finest."""
         local = self.positions.copy()
         for vertices in self.moving:
             local[vertices] -= find_middle(local[vertices])
@@ -35,22 +35,22 @@ class MapMesh:
 
     @classmethod
     def from_geometry(cls, geometry: Geometry) -> MapMesh:
-        """The triangles of a scene."""
+        """Make the mesh of a scene's triangles."""
         rest = geometry.rest
         return cls(rest.positions, rest.faces, tuple(model.vertices for model in rest.moving))
 
     def make_clusters(self) -> Clusters:
-        """In clusters, none with triangles of two models that move apart. Those of moving models have no place yet."""
+        """Make clusters, none with triangles of two groups. Those of moving models are not placed yet."""
         return Clusters(self.local, self.faces, groups=self.groups if self.moving else None)
 
     def pose(self, clusters: Clusters, poses: Array) -> PosedMesh:
-        """In these clusters, its moving models brought from rest by `poses` (m, 4, 4)."""
+        """Place its moving models, in these clusters, by `poses` (m, 4, 4) from rest."""
         return PosedMesh(self, clusters, poses)
 
 
 @dataclass(frozen=True)
 class _MovingPart:
-    """A moving model: its vertices (n, 3) at rest, its clusters, and the corners of their faces, in order, in these."""
+    """A moving model: its vertices (n, 3) at rest, its clusters, and the corners of their faces by vertex, in order."""
 
     rest: Array
     clusters: slice
@@ -66,7 +66,7 @@ class _MovingPart:
 
 
 class PosedMesh:
-    """A mesh in clusters whose boxes are where its moving models are."""
+    """A mesh in clusters whose boxes follow its moving models."""
 
     def __init__(self, mesh: MapMesh, clusters: Clusters, poses: Array) -> None:
         self.mesh, self.clusters = mesh, clusters
@@ -75,7 +75,7 @@ class PosedMesh:
             self.move(number, pose)
 
     def move(self, number: int, pose: Array) -> tuple[int, Array]:
-        """Bring moving model `number` from rest by `pose` (4, 4): its first vertex, and all of them, float32 (n, 3)."""
+        """Move model `number` by `pose` (4, 4) from rest. Returns its first vertex and positions, float32 (n, 3)."""
         part = self._parts[number]
         points = transform_points(part.rest, pose).astype(np.float32)
         if part.clusters.stop > part.clusters.start:

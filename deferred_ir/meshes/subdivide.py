@@ -1,8 +1,8 @@
-"""Splitting triangles until no edge is longer than a bound. No OpenGL.
+"""Splits triangles until no edge is longer than a bound. No OpenGL.
 
-Edges are halved, and whether one is goes by its two ends alone: triangles that share an edge, even with vertices of
-their own, split it alike, so no crack opens between them. (`trimesh.remesh.subdivide_to_size` splits all three edges of
-a triangle where one is too long, whatever its neighbour does.)
+Whether an edge is halved depends on its two ends alone, so triangles that share an edge, even with vertices of their
+own, split it alike, and no crack opens. (`trimesh.remesh.subdivide_to_size` splits all three edges of a triangle if one
+is too long, whatever its neighbour does.)
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from deferred_ir.meshes.posed import MapMesh
 from deferred_ir.scene.geometry import find_middle
 
 MOST = 2_000_000
-"""Triangles; more are refused before they are made."""
+"""Most triangles; more are refused before they are made."""
 
 
 def subdivide(positions: Array, faces: Ints, longest: float, most: int = MOST) -> tuple[Array, Ints]:
-    """The same surface with edges of at most `longest`: positions (V', 3), float64, and faces (F', 3).
+    """Split the surface so that no edge is longer than `longest`: positions (V', 3), float64, and faces (F', 3).
 
-    positions: (V, 3), of which float32 counts; vertices at one place become one. faces: (F, 3); parts keep its winding.
-    Raises GraphError if there would be more than `most` triangles.
+    positions: (V, 3), rounded to float32; vertices at the same place become one. faces: (F, 3); pieces keep the
+    winding. Raises GraphError if there would be more than `most` triangles.
     """
     points, index = np.unique(positions.astype(np.float32), axis=0, return_inverse=True)
     # Middles in double precision: far from the origin, halves of a short edge would meet one of its ends.
@@ -42,12 +42,12 @@ def subdivide(positions: Array, faces: Ints, longest: float, most: int = MOST) -
                 "larger one, or shadow_maps.tessellation = 'adaptive'"
             )
         points, middles = _halve(points, ahead, long)
-        ahead = _parts(points, ahead, middles, long)
+        ahead = _split_faces(points, ahead, middles, long)
     return points, np.concatenate(done)
 
 
 def subdivide_mesh(mesh: MapMesh, longest: float) -> MapMesh:
-    """The same for a mesh, of which what moves apart is split apart."""
+    """Subdivide a mesh, each moving model on its own, so that models never share a vertex."""
     parts = [subdivide(mesh.positions, mesh.faces[mesh.groups == 0], longest)]
     for number, vertices in enumerate(mesh.moving, start=1):
         own, faces = mesh.positions[vertices], mesh.faces[mesh.groups == number] - vertices.start
@@ -62,14 +62,14 @@ def subdivide_mesh(mesh: MapMesh, longest: float) -> MapMesh:
 
 
 def _lengths(points: Array, faces: Ints) -> Array:
-    """Of edge i of each face, from corner i to the next, (F, 3): the same from either end, to the last bit."""
+    """Return the length of edge i of each face, from corner i to the next, (F, 3): the same bits from both ends."""
     corners = points[faces]
     lengths: Array = np.sqrt(((np.roll(corners, -1, axis=1) - corners) ** 2).sum(axis=2))
     return lengths
 
 
 def _halve(points: Array, faces: Ints, long: Bools) -> tuple[Array, Ints]:
-    """Points with the middles of the edges `long` (F, 3) behind them, and the number of each, (F, 3)."""
+    """Append the middles of the edges `long` (F, 3) to the points. Returns these and the middles' indices, (F, 3)."""
     ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)[long]
     keys, number = np.unique(ends.min(axis=1) * len(points) + ends.max(axis=1), return_inverse=True)
     one, other = points[keys // len(points)], points[keys % len(points)]
@@ -78,16 +78,16 @@ def _halve(points: Array, faces: Ints, long: Bools) -> tuple[Array, Ints]:
     return np.concatenate([points, one / 2 + other / 2]), middles
 
 
-def _parts(points: Array, faces: Ints, middles: Ints, long: Bools) -> Ints:
-    """Each face cut between the middles of its edges that are `long` (F, 3): into two, three or four parts."""
+def _split_faces(points: Array, faces: Ints, middles: Ints, long: Bools) -> Ints:
+    """Split each face between the middles of its edges that are `long` (F, 3), into two, three or four."""
     count = long.sum(axis=1)
-    # Turned so that the first edge is long, and of two the second as well.
+    # Rotate the corners so that the first edge is long, and the second if two are.
     turn = np.where(count == 1, long.argmax(axis=1), np.where(count == 2, (long.argmin(axis=1) + 1) % 3, 0))
-    turned = (np.arange(3) + turn[:, None]) % 3
-    a, b, c = np.take_along_axis(faces, turned, axis=1).T
-    ab, bc, ca = np.take_along_axis(middles, turned, axis=1).T
+    rotated = (np.arange(3) + turn[:, None]) % 3
+    a, b, c = np.take_along_axis(faces, rotated, axis=1).T
+    ab, bc, ca = np.take_along_axis(middles, rotated, axis=1).T
     one, two, three = count == 1, count == 2, count == 3
-    # With two long edges, what is left beyond the corner between them is cut along its shorter diagonal.
+    # With two long edges, the quadrilateral beyond the corner between them is split along its shorter diagonal.
     shorter = np.linalg.norm(points[bc] - points[a], axis=1) < np.linalg.norm(points[ab] - points[c], axis=1)
     parts = [
         (one, (a, ab, c), (ab, b, c)),

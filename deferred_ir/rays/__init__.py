@@ -1,1 +1,1 @@
-"""Embree, and what rays tell of a scene."""
+"""Ray queries with Embree, and what is computed from their hits."""

@@ -1,4 +1,4 @@
-"""Irradiance by the spotlight on surfaces, with ray-cast shadows: the formula of shaders/lib/lights/light.glsl."""
+"""Direct irradiance by the spotlight with ray-cast shadows, by the formula of shaders/lib/lights/light.glsl."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ GOLDEN_ANGLE = np.pi * (3 - 5**0.5)
 
 
 def compute_irradiance(light: Spotlight, tracer: Tracer, at: Hits, rng: np.random.Generator) -> Array:
-    """Irradiance on surfaces `at` (n, all of them hit) divided by the spotlight's emission, float64 (n,).
+    """Return the irradiance on surfaces `at` (n, all hit) divided by the spotlight's emission, float64 (n,).
 
-    A disc light is asked at one random point of its disc for each surface, a point light at its position.
+    A disc light is sampled at one random point for each surface.
     """
     points = square_to_disc(rng.random((len(at.face), 2))) if light.radius > 0 else None
-    return _arriving(light, tracer, at, points)
+    return _irradiate(light, tracer, at, points)
 
 
 def trace_spotlight(job: PixelJob, *, samples: int) -> Array:
@@ -47,11 +47,11 @@ def trace_spotlight(job: PixelJob, *, samples: int) -> Array:
         number, rows = task
         at = seen.rows(rows)
         if light.radius == 0:
-            return _arriving(light, tracer, at, None)
+            return _irradiate(light, tracer, at, None)
         places = pixel_blocks.jitter(index[rows, 0], grid, streams.shadow_rays(seed, number)) + shift
         total = np.zeros(len(at.pixel))
         for i in range(samples):
-            total += _arriving(light, tracer, at, _spiral(places % 1, i, samples))
+            total += _irradiate(light, tracer, at, _spiral(places % 1, i, samples))
         return total / samples
 
     with closing(run_in_order(work, tasks, job.threads)) as results:
@@ -61,18 +61,18 @@ def trace_spotlight(job: PixelJob, *, samples: int) -> Array:
 
 
 def _spiral(places: Array, i: int, count: int) -> Array:
-    """Point i of `count` that are spread over the unit disc, one set a row of `places` (n, 2) in [0, 1), (n, 2).
+    """Return point i of `count` points spread over the unit disc, for each row of `places` (n, 2) in [0, 1), (n, 2).
 
-    Vogel's spiral, turned by the first coordinate; the second says where in its ring of equal area a point lies, so
-    that even places give even points.
+    The points form Vogel's spiral, rotated by the first coordinate; the second says where in its ring of equal area a
+    point lies, so that evenly spread places give evenly spread points.
     """
     radius = np.sqrt((i + places[:, 1]) / count)
     angle = 2 * np.pi * places[:, 0] + i * GOLDEN_ANGLE
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
-def _arriving(light: Spotlight, tracer: Tracer, at: Hits | Surfaces, points: Array | None) -> Array:
-    """Irradiance over emission on surfaces (n), float64 (n,); from `points` of the unit disc, (n, 2), if any."""
+def _irradiate(light: Spotlight, tracer: Tracer, at: Hits | Surfaces, points: Array | None) -> Array:
+    """Return irradiance over emission on n surfaces, float64 (n,); points: on the unit disc of a disc light, (n, 2)."""
     source = np.broadcast_to(np.asarray(light.position, float), at.position.shape)
     if points is not None:
         right, up = build_basis(light.axis)

@@ -1,7 +1,7 @@
-"""Embree over the triangles of one scene, whose moving models have a scene each of their own: Embree cannot refit.
+"""Embree over the triangles of one scene. Moving models have Embree scenes of their own: Embree cannot refit one.
 
-Rays are carried into a moving model's rest by the inverse of its pose; where they meet it they meet it at the same
-multiple of their direction. Only rays that meet its box are.
+Rays that meet a moving model's box are transformed by the inverse of its pose; hits keep their multiple of the
+direction.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from deferred_ir.base.errors import DeviceError
 from deferred_ir.scene.geometry import Geometry, find_middle
 
 INFINITE = 1e37
-"""What Embree is told for no end."""
+"""The length that stands for an unbounded ray."""
 SLACK = 1e-5
-"""A moving model's box is wider by this fraction of its size and place: rays come in 32 bits."""
+"""A moving model's box is enlarged by this fraction of its size and coordinates, as rays are in 32-bit floats."""
 
 
 @dataclass(frozen=True)
 class _MovingModel:
-    """A moving model. centre: of its own coordinates, at rest; turn (3, 3), shift (3,): from the world's into these."""
+    """A moving model. box: where it is; turn (3, 3), shift (3,): from world to its own coordinates."""
 
     embree: Any
     faces: Ints
@@ -31,27 +31,27 @@ class _MovingModel:
     turn: Array
     shift: Array
 
-    def carry(self, origins: Array, ways: Array) -> tuple[Array, Array]:
-        """Rays (n, 3), (n, 3) in its own coordinates, float32."""
+    def transform_rays(self, origins: Array, ways: Array) -> tuple[Array, Array]:
+        """Transform rays (n, 3), (n, 3) to its own coordinates, float32."""
         own: Array = origins.astype(np.float64) @ self.turn.T + self.shift
         return own.astype(np.float32), (ways.astype(np.float64) @ self.turn.T).astype(np.float32)
 
-    def near(self, origins: Array, ways: Array, reach: Array) -> Ints:
-        """Which of the rays meet its box within `reach` (n,) lengths of their directions, int (m,)."""
+    def find_near(self, origins: Array, ways: Array, reach: Array) -> Ints:
+        """Return which rays meet its box within `reach` (n,) lengths of their directions, int (m,)."""
         enter, leave = np.zeros(len(origins), np.float32), reach
         for axis, (low, high) in enumerate(self.box.T.astype(np.float32)):
             origin = origins[:, axis]
             with np.errstate(divide="ignore", invalid="ignore"):
                 inverse = 1 / ways[:, axis]
                 first, second = (low - origin) * inverse, (high - origin) * inverse
-            # A ray in a side's plane gives 0 * inf: fmin and fmax pass over it.
+            # A ray in a side's plane gives 0 * inf = NaN, which fmin and fmax ignore.
             enter = np.fmax(enter, np.fmin(first, second))
             leave = np.fmin(leave, np.fmax(first, second))
         return np.flatnonzero(enter <= leave * np.float32(1 + SLACK))
 
 
 class EmbreeScenes:
-    """Asks Embree. Origins and directions are float32 (n, 3); safe in many threads."""
+    """Embree's scenes of one geometry. Rays are float32 (n, 3); queries are safe from many threads."""
 
     def __init__(self, geometry: Geometry) -> None:
         self._still = np.flatnonzero(geometry.groups == 0) if geometry.moving else None
@@ -60,28 +60,28 @@ class EmbreeScenes:
         rest = geometry.rest
         self._centres, self._models = list[Array](), list[Any]()
         for model, own in zip(rest.moving, rest.faces_of_models, strict=True):
-            # In coordinates about its own middle: 32 bits are finest there.
+            # Relative to its middle, where 32-bit floats are finest.
             at = rest.positions[model.vertices]
             self._centres.append(find_middle(at))
             self._models.append(_build_scene(at - self._centres[-1], rest.faces[own] - model.first_vertex))
-        self._bodies: list[_MovingModel] = []
+        self._moving: list[_MovingModel] = []
         self.pose(geometry)
 
     def pose(self, geometry: Geometry) -> None:
-        """Go on with the same triangles, posed in another way."""
-        self._bodies = []
+        """Move the moving models to another pose of the same geometry."""
+        self._moving = []
         for i, pose in enumerate(geometry.poses):
             low, high = geometry.boxes[i]
             slack = SLACK * (np.abs([low, high]).max() + np.linalg.norm(high - low))
             turn = pose[:3, :3].T
             shift = -turn @ pose[:3, 3] - self._centres[i]
             faces = geometry.faces_of_models[i]
-            self._bodies.append(
+            self._moving.append(
                 _MovingModel(self._models[i], faces, np.stack([low - slack, high + slack]), turn, shift)
             )
 
     def closest(self, origins: Array, ways: Array, reach: Array | None = None) -> tuple[Ints, Array, Array]:
-        """First faces met, int32 (n,), -1 for none, and barycentric u and v there, float32 (n,).
+        """Return the first faces hit, int32 (n,), -1 for none, and barycentric u and v there, float32 (n,).
 
         reach: (n,) lengths of the directions, None for no end.
         """
@@ -93,31 +93,31 @@ class EmbreeScenes:
         far, hit = np.asarray(found["tfar"]), face >= 0
         face = face.copy()
         face[hit] = self._still[face[hit]]
-        for body in self._bodies:
-            rows = body.near(origins, ways, far)
+        for model in self._moving:
+            rows = model.find_near(origins, ways, far)
             if not len(rows):
                 continue
-            found = body.embree.run(*body.carry(origins[rows], ways[rows]), dists=far[rows], output=1)
+            found = model.embree.run(*model.transform_rays(origins[rows], ways[rows]), dists=far[rows], output=1)
             met = np.flatnonzero(np.asarray(found["primID"]) >= 0)
             rows = rows[met]
-            face[rows] = body.faces[found["primID"][met]]
+            face[rows] = model.faces[found["primID"][met]]
             far[rows], u[rows], v[rows] = found["tfar"][met], found["u"][met], found["v"][met]
         return face, u, v
 
     def occluded(self, origins: Array, ways: Array, reach: Array) -> Bools:
-        """Whether anything is met within `reach` (n,) lengths of the directions, bool (n,)."""
+        """Return whether rays hit anything within `reach` (n,) lengths of their directions, bool (n,)."""
         hidden: Bools = np.asarray(self._scene.run(origins, ways, dists=reach.copy(), query="OCCLUDED")) == 0
-        for body in self._bodies:
+        for model in self._moving:
             free = np.flatnonzero(~hidden)
-            free = free[body.near(origins[free], ways[free], reach[free])]
+            free = free[model.find_near(origins[free], ways[free], reach[free])]
             if len(free):
-                carried = body.carry(origins[free], ways[free])
-                hidden[free] = np.asarray(body.embree.run(*carried, dists=reach[free], query="OCCLUDED")) == 0
+                rays = model.transform_rays(origins[free], ways[free])
+                hidden[free] = np.asarray(model.embree.run(*rays, dists=reach[free], query="OCCLUDED")) == 0
         return hidden
 
 
 def _build_scene(positions: Array, faces: Ints) -> Any:
-    """An Embree scene, committed. Raises DeviceError without embreex."""
+    """Build and commit an Embree scene. Raises DeviceError without embreex."""
     try:
         from embreex import rtcore_scene
         from embreex.mesh_construction import TriangleMesh
@@ -133,7 +133,7 @@ def _build_scene(positions: Array, faces: Ints) -> Any:
 
 
 def can_trace() -> bool:
-    """Whether Embree finds a triangle before a ray: it comes compiled, so an import alone proves little.
+    """Return whether Embree finds a triangle: it is a compiled library, so an import alone proves little.
 
     Raises DeviceError without embreex.
     """

@@ -1,4 +1,4 @@
-"""Surfaces behind a frame's pixels, from a G-buffer that was read back: what the shaders see, on the CPU."""
+"""The surfaces that pixels show, decoded on the CPU from a G-buffer that was read back."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from deferred_ir.scene.camera import Camera
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """What n pixels show; the background is left out.
+    """The surfaces that n pixels show, without the background.
 
     pixel: int (n,), row * width + column, bottom row first, ascending.
     position, normal (geometric), shading_normal: float32 (n, 3), world space, both normals towards the viewer.
@@ -25,7 +25,7 @@ class Surfaces:
     shading_normal: Array
 
     def rows(self, chosen: Ints | slice) -> Surfaces:
-        """Some of them: indices (m,) or a slice."""
+        """Return the surfaces `chosen`, indices (m,) or a slice."""
         normal = self.normal[chosen]
         smooth = normal if self.shading_normal is self.normal else self.shading_normal[chosen]
         return Surfaces(self.pixel[chosen], self.position[chosen], normal, smooth)
@@ -69,7 +69,7 @@ def decode_gbuffer(camera: Camera, near: float, depth: Array, normals: Array, *,
 
 
 def _from_octahedral(code: Array) -> Array:
-    """Unit vectors (n, 3) of codes (n, 2) in [0, 1] (Cigolle et al. 2014), as in shaders/lib/surface/gbuffer.glsl."""
+    """Decode unit vectors (n, 3) from codes (n, 2) in [0, 1] (Cigolle et al. 2014), as gbuffer.glsl does."""
     vectors = np.empty((len(code), 3), np.float32)
     plane, z = vectors[:, :2], vectors[:, 2]
     np.subtract(code * np.float32(2), np.float32(1), out=plane)

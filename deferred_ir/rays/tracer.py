@@ -1,4 +1,4 @@
-"""Ray queries with Embree: closest hits with everything a light path needs, and occlusion between points.
+"""Ray queries: closest hits with everything a light path needs, and occlusion between points.
 
 embreex runs in one thread and releases the GIL, so rays go out in chunks over a thread pool. It is an optional
 dependency (no Linux arm64 wheel): without it `Tracer` raises a one-line DeviceError.
@@ -29,11 +29,11 @@ origin where that is larger: float32 positions err by 1e-7 of it."""
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """Closest hits of n rays; rows of rays that miss hold zeros and face -1.
+    """The closest hits of n rays; rows of rays that miss hold zeros and face -1.
 
     face: int32 (n,). position: float64 (n, 3). albedo: float64 (n, 3).
-    normal: geometric normal, shading_normal: both unit, float64 (n, 3), turned
-        against the ray as docs/conventions.md says.
+    normal: geometric normal, shading_normal: both unit, float64 (n, 3), facing
+        the ray's origin as docs/conventions.md says.
     """
 
     face: Ints
@@ -48,12 +48,12 @@ class Hits:
         return self.face >= 0
 
     def rows(self, chosen: Ints) -> Hits:
-        """The hits of the rays `chosen`, indices (m,)."""
+        """Return the hits of the rays `chosen`, indices (m,)."""
         return Hits(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
 class Tracer:
-    """Embree over one scene's triangles. Build it once a scene, and let it `follow` the scene's moving models.
+    """Ray queries on one scene. Build it once a scene, and let it `follow` the scene's moving models.
 
     `seconds` is the time spent inside Embree so far.
     """
@@ -65,7 +65,7 @@ class Tracer:
         self.offset = OFFSET * scene.geometry.scale
 
     def follow(self, scene: Scene) -> None:
-        """Go on with the same triangles where `scene` has them: its moving models may be elsewhere."""
+        """Move to the same triangles as `scene` has them, with its moving models elsewhere."""
         if scene.geometry is not self.scene.geometry:
             self._rays.pose(scene.geometry)
         self.scene = scene
@@ -75,7 +75,7 @@ class Tracer:
         return ThreadPoolExecutor(os.cpu_count())
 
     def _map(self, function: Callable[[slice], Any], count: int) -> list[Any]:
-        """`function` of each chunk of `count` rays, in order; on the pool only where there is more than one."""
+        """Return the results of `function` for chunks of `count` rays, in order; several chunks run on threads."""
         chunks = [slice(start, start + CHUNK) for start in range(0, count, CHUNK)]
         start = time.perf_counter()
         results = list(self._pool.map(function, chunks)) if len(chunks) > 1 else [function(chunk) for chunk in chunks]
@@ -83,16 +83,16 @@ class Tracer:
         return results
 
     def closest(self, origins: Array, directions: Array) -> Hits:
-        """First surfaces that rays (n, 3), (n, 3) meet; the caller offsets origins that lie on a surface."""
+        """Return the first surfaces that rays (n, 3), (n, 3) hit; the caller offsets origins that lie on a surface."""
         org, dirs = origins.astype(np.float32), directions.astype(np.float32)
         face, u, v = self._first(lambda chunk: self._rays.closest(org[chunk], dirs[chunk]), len(org))
         u, v = u.astype(np.float64), v.astype(np.float64)
         return self._hits(face, np.stack([1 - u - v, u, v], axis=-1), np.asarray(directions, np.float64))
 
     def within(self, origins: Array, directions: Array, reach: float) -> tuple[Ints, Hits]:
-        """Which of the rays (n, 3), (n, 3) meet a surface within `reach` lengths of their directions, and where.
+        """Find the rays (n, 3), (n, 3) that hit a surface within `reach` lengths of their directions.
 
-        Rows of the rays (m,), ascending, and their m closest hits. As `closest`, but free of what rays that miss cost.
+        Returns the rows of these rays (m,), ascending, and their m closest hits; rays that miss cost little.
         """
         org, dirs = origins.astype(np.float32), directions.astype(np.float32)
         ends = np.full(len(org), min(reach, INFINITE), np.float32)
@@ -103,7 +103,7 @@ class Tracer:
         return rows, self._hits(face[rows], weights, np.asarray(directions[rows], np.float64))
 
     def _first(self, ask: Callable[[slice], tuple[Ints, Array, Array]], count: int) -> tuple[Ints, Array, Array]:
-        """What `ask` gives for all chunks of rays, joined: faces, u and v."""
+        """Query all chunks of rays by `ask` and join the results: faces, u and v."""
         parts = [(np.zeros(0, np.int32), np.zeros(0, np.float32), np.zeros(0, np.float32)), *self._map(ask, count)]
         face, u, v = (np.concatenate(column) for column in zip(*parts, strict=True))
         return face, u, v
@@ -126,11 +126,11 @@ class Tracer:
         return Hits(face, position, normal, shading, albedo)
 
     def occluded(self, origins: Array, targets: Array, *, lifted: bool = False) -> Bools:
-        """Whether anything lies strictly between points (n, 3) and (n, 3), bool (n,).
+        """Return whether anything lies strictly between points (n, 3) and (n, 3), bool (n,).
 
-        The far end stops short by a ten-thousandth of the way, so targets may lie on surfaces; an origin on a surface
-        needs its offset (see `lift`). lifted: targets have theirs as well, and the whole way counts, since a wall may
-        stand close to them.
+        Rays stop short by a ten-thousandth of the way, so targets may lie on surfaces; an origin on a surface must be
+        offset (see `lift`). lifted: targets are offset as well, and the whole way counts, since a wall may stand close
+        to them.
         """
         org, way = origins.astype(np.float32), (targets - origins).astype(np.float32)
         reach = np.full(len(org), 1 if lifted else 1 - 1e-4, np.float32)
@@ -138,20 +138,20 @@ class Tracer:
         return np.concatenate([np.zeros(0, bool), *parts])
 
     def lift(self, positions: Array, normals: Array) -> Array:
-        """Points pushed off their surfaces along `normals`, so that rays from them do not meet it again."""
+        """Return points pushed off their surfaces along `normals`, so that rays from them do not hit these again."""
         far = OFFSET * np.abs(positions).max(axis=-1, keepdims=True)
         lifted: Array = positions + normals * np.maximum(far, self.offset)
         return lifted
 
 
 def interpolate(values: Array, corners: Ints, weights: Array) -> Array:
-    """The rows of `values` (v, 3) at `corners` (n, 3), weighted by `weights` (n, 3) and added up, float64 (n, 3)."""
+    """Interpolate the rows of `values` (v, 3) at `corners` (n, 3) by barycentric `weights` (n, 3), float64 (n, 3)."""
     a, b, c = (values[corners[:, i]] * weights[:, i, None] for i in range(3))
     total: Array = a + b + c
     return total
 
 
 def face_towards(normals: Array, towards: Array) -> Array:
-    """`normals` (n, 3), flipped where they point away from `towards` (n, 3)."""
+    """Return `normals` (n, 3), flipped where they point away from `towards` (n, 3)."""
     away = np.einsum("ij,ij->i", normals, towards) < 0
     return np.where(away[:, None], -normals, normals)

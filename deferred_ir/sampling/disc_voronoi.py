@@ -1,4 +1,4 @@
-"""Sites in the unit disc: their Voronoi cells' share of it, its largest empty circle, and which site is most crowded.
+"""Voronoi cells of sites in the unit disc: their areas, the largest empty circle, and the most crowded site.
 
 Laine et al. 2007 ("Incremental Instant Radiosity", EGSR, section 4) keep VPLs spread evenly by these three.
 """
@@ -13,14 +13,16 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Ints
 
 GHOSTS = np.array([[4.1, 4.0], [-4.0, 4.2], [-4.3, -4.0], [4.0, -4.4]])
-"""Sites so far outside that no point of the disc is nearer to one of them than to a site in the disc. With them every
-cell is bounded and no set of sites is too small or too straight for a triangulation."""
+"""Extra sites so far outside that every point of the disc is nearer to a site within it.
+
+They bound every cell, and make any set of sites large and irregular enough for a triangulation.
+"""
 JITTER = 1e-7
-"""Sites are moved by about this much, so that no two coincide and no four lie on a circle."""
+"""Sites are displaced by about this much, so that no two coincide and no four lie on a circle."""
 
 
 class VoronoiCells:
-    """The Voronoi diagram of `sites` (n, 2) in the unit disc, n >= 0; `add` puts one more into it."""
+    """The Voronoi diagram of `sites` (n, 2) in the unit disc, n >= 0, to which sites can be added."""
 
     def __init__(self, sites: Array) -> None:
         from scipy.spatial import Delaunay
@@ -29,7 +31,7 @@ class VoronoiCells:
         self._triangles: Any = Delaunay(np.concatenate([GHOSTS, self._jitter_sites(0)]), incremental=True)
 
     def add(self, site: Array) -> None:
-        """One more site, (2,), the last from now on."""
+        """Add a site, (2,), as the last one."""
         self.sites = np.concatenate([self.sites, site[None]])
         self._triangles.add_points(self._jitter_sites(len(self.sites) - 1))
 
@@ -40,9 +42,10 @@ class VoronoiCells:
         return moved
 
     def _find_edges(self) -> tuple[Ints, Array, Array]:
-        """The edges of the cells: the sites on both sides, int (m, 2), and their ends, (m, 2, 2); all corners, (k, 2).
+        """Return the edges of the cells.
 
-        Ghosts have numbers below 0. Those between ghosts that have no end are left out.
+        Of each edge the sites on both sides, int (m, 2), and the ends, (m, 2, 2); of all cells the corners, (k, 2).
+        Ghosts have numbers below 0. Unbounded edges, which lie between ghosts, are left out.
         """
         corners, neighbours = self._triangles.simplices, self._triangles.neighbors
         centres = _find_circumcentres(self._triangles.points[corners])
@@ -51,7 +54,7 @@ class VoronoiCells:
         return sides, np.stack([centres[triangle], centres[neighbours[triangle, opposite]]], axis=1), centres
 
     def areas(self) -> Array:
-        """Each site's share of the disc, (n,); they add up to 1."""
+        """Return the fraction of the disc's area that each site's cell has, (n,); they add up to 1."""
         sides, ends, _ = self._find_edges()
         area = _measure_sectors(ends[:, 0], ends[:, 1])
         points = self._triangles.points[sides + len(GHOSTS)]
@@ -64,7 +67,7 @@ class VoronoiCells:
         return np.maximum(shares, 0) / np.pi
 
     def find_emptiest_circle(self, radius: float = 1.0) -> tuple[Array, float]:
-        """Centre (2,) of the largest circle without a site among those about points of the disc of `radius`; its size.
+        """Return centre (2,) and radius of the largest circle without a site whose centre lies in the disc of `radius`.
 
         It lies at a corner of the cells, or where an edge of a cell leaves the disc, or opposite a site.
         """
@@ -87,18 +90,18 @@ class VoronoiCells:
 
 
 def find_most_crowded(sites: Array) -> tuple[int, float]:
-    """Which of `sites` (n, 2), n >= 2, to give up, and the distance to its nearest neighbour.
+    """Return the most crowded of `sites` (n, 2), n >= 2, and the distance to its nearest neighbour.
 
-    The shortest edge of the Delaunay triangulation joins the closest two sites. Of these it is the one whose next
+    It is one of the closest two sites, which the shortest edge of the Delaunay triangulation joins: the one whose next
     neighbour is closer.
     """
     from scipy.spatial import cKDTree
 
-    # k nearest: itself or one that coincides with it, then the others; beyond n it gives infinity.
+    # The 3 nearest: the site itself (or one that coincides with it), then others; infinity beyond n.
     distance = cKDTree(sites).query(sites, k=3)[0]
     pair = np.flatnonzero(distance[:, 1] == distance[:, 1].min())
-    given_up = int(pair[np.argmin(distance[pair, 2])])
-    return given_up, float(distance[given_up, 1])
+    crowded = int(pair[np.argmin(distance[pair, 2])])
+    return crowded, float(distance[crowded, 1])
 
 
 @lru_cache(maxsize=8)
@@ -112,7 +115,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _find_circumcentres(corners: Array) -> Array:
-    """Centres (n, 2) of the circles through triangles (n, 3, 2)."""
+    """Return the centres (n, 2) of the circles through the corners of triangles (n, 3, 2)."""
     a = corners[:, 0]
     b, c = corners[:, 1] - a, corners[:, 2] - a
     bb, cc = (b**2).sum(axis=1), (c**2).sum(axis=1)
@@ -122,7 +125,7 @@ def _find_circumcentres(corners: Array) -> Array:
 
 
 def _find_crossings(a: Array, b: Array, radius: float) -> Array:
-    """Where lines from `a` to `b` (n, 2) enter and leave the circle, (n, 2), 0 at a and 1 at b; NaN if they miss it."""
+    """Return where lines from `a` (0) to `b` (1), both (n, 2), enter and leave the circle, (n, 2); NaN for a miss."""
     way = b - a
     square = np.maximum((way**2).sum(axis=1), 1e-300)
     middle = -(a * way).sum(axis=1) / square
@@ -132,14 +135,14 @@ def _find_crossings(a: Array, b: Array, radius: float) -> Array:
 
 
 def _cut_with_circle(a: Array, b: Array, radius: float) -> Array:
-    """Points (m, 2) of the circle on segments from `a` to `b` (n, 2)."""
+    """Return the points (m, 2) where segments from `a` to `b` (n, 2) cross the circle."""
     at = _find_crossings(a, b, radius)
     segment, which = np.nonzero((at >= 0) & (at <= 1))
     return a[segment] + at[segment, which, None] * (b - a)[segment]
 
 
 def _measure_sectors(a: Array, b: Array) -> Array:
-    """Signed area of what the unit disc has of the triangles from its centre to `a` and `b` (n, 2): (n,)."""
+    """Return the signed area, (n,), that the unit disc shares with triangles of its centre, `a` and `b` (n, 2)."""
     at = _find_crossings(a, b, 1.0)
     meets = (at[:, 0] < 1) & (at[:, 1] > 0)
     at = np.clip(np.where(meets[:, None], at, 0), 0, 1)

@@ -1,6 +1,6 @@
-"""Points in the order in which a Hilbert curve visits them (Skilling 2004, "Programming the Hilbert curve").
+"""Sorts points along a Hilbert curve (Skilling 2004, "Programming the Hilbert curve").
 
-Neighbours on the curve are neighbours in space, so what is spread evenly along it is spread evenly in space.
+Neighbours on the curve are neighbours in space, so an even spread along it is an even spread in space.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from deferred_ir.base.arrays import Array, Ints
 
 
 def find_hilbert_order(points: Array, bits: int) -> Ints:
-    """Indices that sort `points` (n, d), of [0, 1], along a curve through 2^(bits d) cells; bits d is at most 64."""
+    """Return indices that sort `points` (n, d) of [0, 1]^d along a curve of 2^(bits d) cells; bits d is at most 64."""
     cells = np.ascontiguousarray(np.clip(points * 2.0**bits, 0, 2**bits - 1).astype(np.uint64).T)
     zero, one = np.uint64(0), np.uint64(1)
     levels = one << np.arange(bits - 1, 0, -1, dtype=np.uint64)
-    # From the coarsest cells to the finest: turn and mirror the curve within each as the one around it asks.
+    # From coarse cells to fine: rotate and mirror the curve within each by the orientation of the cell around it.
     for level in levels:
         below = level - one
         for i in range(len(cells)):

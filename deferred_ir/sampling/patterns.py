@@ -22,7 +22,7 @@ PATTERNS: tuple[str, ...] = get_args(Pattern)
 
 @lru_cache(maxsize=8)
 def sample_unit_square(pattern: Pattern, count: int, seed: int) -> Array:
-    """`count` points in [0, 1)^2, float64 (count, 2), the same for the same arguments. Read-only: it is cached."""
+    """Return `count` points in [0, 1)^2, float64 (count, 2), the same for the same arguments; cached, so read-only."""
     points = _points(pattern, count, seed)
     points.flags.writeable = False
     return points
@@ -30,14 +30,14 @@ def sample_unit_square(pattern: Pattern, count: int, seed: int) -> Array:
 
 @lru_cache(maxsize=8)
 def sample_unit_disc(pattern: Pattern, count: int, seed: int) -> Array:
-    """`sample_unit_square` mapped to the unit disc. Read-only: it is cached, for frames that repeat a seed."""
+    """Return the points of `sample_unit_square` mapped to the unit disc; cached for repeated seeds, so read-only."""
     points = square_to_disc(sample_unit_square(pattern, count, seed))
     points.flags.writeable = False
     return points
 
 
 def warn_unbalanced(pattern: Pattern, count: int) -> None:
-    """Say that `count` points of a Sobol set are not balanced, unless it is a power of two."""
+    """Log a warning if `count` points of a Sobol set are not balanced: only powers of two are."""
     if pattern == "sobol" and count & (count - 1):
         whole = 1 << count.bit_length()
         log.warning(
@@ -55,13 +55,13 @@ def _points(pattern: Pattern, count: int, seed: int) -> Array:
 
     if pattern == "halton":
         return np.asarray(qmc.Halton(2, rng=rng).random(count))
-    # All 2^m points: SciPy would warn about other counts, and warn_unbalanced has done so once.
+    # Draw all 2^m points: SciPy would warn about other counts, and warn_unbalanced has already.
     points: Array = qmc.Sobol(2, rng=rng).random_base2(int(np.ceil(np.log2(count))))[:count]
     return points
 
 
 def _stratified(count: int, rng: np.random.Generator) -> Array:
-    """Jittered cells: rows of nearly equal area and count, so that any `count` works, not only squares."""
+    """Return a jittered point in each of `count` cells of equal area, in rows, so that any count works."""
     rows = max(1, round(np.sqrt(count)))
     per_row = np.diff(np.arange(rows + 1) * count // rows)
     row = np.repeat(np.arange(rows), per_row)
@@ -76,9 +76,9 @@ def _stratified(count: int, rng: np.random.Generator) -> Array:
 
 
 def resample_systematically(weights: Array, count: int, offset: float) -> Ints:
-    """`count` indices, each drawn count * weight / sum(weights) times, rounded up or down (systematic resampling).
+    """Draw `count` indices, each count * weight / sum(weights) times, rounded up or down (systematic resampling).
 
-    Indices come in order. `offset`, uniform in [0, 1), makes it unbiased. Some weight must be above 0.
+    Indices ascend. `offset`, uniform in [0, 1), makes it unbiased. Some weight must be above 0.
     """
     ends = np.cumsum(weights)
     ticks = (np.arange(count) + offset) / count * ends[-1]

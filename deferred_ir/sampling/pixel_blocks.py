@@ -1,7 +1,7 @@
-"""Points of the unit square dealt to the pixels of a block, for images that are made to be filtered.
+"""Stratified points of the unit square dealt to the pixels of a block, for images that will be filtered.
 
-Each pixel of a block takes other cells of one stratification, so that the mean over any window of a block's size is
-that of a well spread set.
+The pixels of a block take different cells of one stratification, so that the mean over any window of a block's size is
+that of a well-spread set.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from deferred_ir.base.arrays import Array, Ints
 
 
 def deal(pixel: Ints, width: int, samples: float, block: int, turn: int) -> tuple[Ints, Ints, int]:
-    """Rows of `pixel` that trace, numbers of their rays' cells (m, rays a pixel), and how many cells a block has.
+    """Deal the cells of a stratification to `pixel` (n,), indices into an image of this width.
 
-    turn: below block^2, which way of dealing the cells to the pixels.
+    Returns which rows of `pixel` trace rays, (m,), the cell of each of their rays, (m, rays a pixel), and the number of
+    cells of a block. turn: below block^2, chooses one of the ways to deal.
     """
     cells = block * block
     y, x = np.divmod(pixel, width)
@@ -32,7 +33,7 @@ def deal(pixel: Ints, width: int, samples: float, block: int, turn: int) -> tupl
 
 @lru_cache
 def _ranks(block: int) -> Ints:
-    """Bayer's ordered dither: the numbers below block^2, neighbours far apart, and any first few spread evenly."""
+    """Return Bayer's ordered dither: the numbers below block^2, with the first few of them spread evenly."""
     ranks = np.zeros((1, 1), int)
     while len(ranks) < block:
         ranks = np.block([[4 * ranks, 4 * ranks + 2], [4 * ranks + 3, 4 * ranks + 1]])
@@ -41,9 +42,9 @@ def _ranks(block: int) -> Ints:
 
 @lru_cache
 def find_lattice(count: int) -> tuple[int, int, Array]:
-    """A rank-1 lattice of `count` points (i, g i mod count) / count: count, g, and its two shortest steps (2, 2).
+    """Find the best rank-1 lattice of `count` points (i, g i mod count) / count: g makes its longer step shortest.
 
-    g makes the longer of the steps as short as it can be.
+    Returns count, g, and the two shortest steps (2, 2).
     """
     best: tuple[float, int, Array] | None = None
     for g in range(1, count + 1):
@@ -57,7 +58,7 @@ def find_lattice(count: int) -> tuple[int, int, Array]:
 
 
 def _reduce(a: Ints, b: Ints) -> Ints:
-    """The lattice of integer vectors a and b by its two shortest steps, the shorter first (Gauss's reduction)."""
+    """Return the two shortest steps of the lattice of integers a and b, the shorter first (Gauss's reduction)."""
     while True:
         if a @ a > b @ b:
             a, b = b, a
@@ -68,7 +69,7 @@ def _reduce(a: Ints, b: Ints) -> Ints:
 
 
 def jitter(index: Ints, grid: tuple[int, int, Array], rng: np.random.Generator) -> Array:
-    """A random point in the cell of each lattice point, float32 (n, 2). Cells are parallelograms that tile it."""
+    """Return a random point in the cell of each lattice point, float32 (n, 2); cells are equal parallelograms."""
     count, g, steps = grid
     jitter = rng.random((len(index), 2), np.float32) @ steps
     corner = np.stack([index, index * g % count], axis=1).astype(np.float32) / np.float32(count)

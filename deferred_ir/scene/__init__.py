@@ -1,1 +1,1 @@
-"""What a scene is: geometry, materials, camera, lights, motions. No OpenGL, no files."""
+"""Scenes: geometry, materials, camera, lights, motions. No OpenGL, no files."""

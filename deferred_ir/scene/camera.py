@@ -1,4 +1,4 @@
-"""The pinhole camera: where it stands, and the numbers that shaders and ray tracers need of it.
+"""The pinhole camera: its place, and the vectors that shaders and ray tracers need.
 
 Conventions (docs/conventions.md): right-handed world, the camera looks along its -z, +x is right, +y is up.
 Pixel (0, 0) is the top left one of an image; its centre lies half a pixel inside.
@@ -18,7 +18,7 @@ from deferred_ir.scene.motion import CameraMotion
 
 
 def view_fault(position: Vec3, look_at: Vec3, up: Vec3 | None = None) -> tuple[str, str] | None:
-    """The key at fault and why, where a view has no direction or `up` lies along it; None for a good view."""
+    """Return the key at fault and why, if a view has no direction or `up` lies along it, else None."""
     view = np.subtract(look_at, position)
     length = math.hypot(*view)
     if length <= 1e-9 * max(map(abs, (*position, *look_at))):
@@ -35,7 +35,7 @@ def view_fault(position: Vec3, look_at: Vec3, up: Vec3 | None = None) -> tuple[s
 
 @dataclass(frozen=True)
 class Camera:
-    """position, look_at, up: world space; fov: vertical opening angle in degrees."""
+    """A pinhole camera. position, look_at, up: world space; fov: vertical opening angle in degrees."""
 
     position: Vec3
     look_at: Vec3
@@ -45,7 +45,7 @@ class Camera:
 
     @cached_property
     def axes(self) -> Array:
-        """Rows: right, up and forward, orthonormal, float64 (3, 3)."""
+        """Right, up and forward, orthonormal rows, float64 (3, 3)."""
         # Three numbers each: given one tuple, PyGLM reads it in single precision.
         view = glm.lookAt(glm.dvec3(*self.position), glm.dvec3(*self.look_at), glm.dvec3(*self.up))
         rows = np.array(view, dtype=np.float64)[:3, :3]  # GLM's rows of the view matrix: right, up, backward
@@ -53,7 +53,7 @@ class Camera:
         return axes
 
     def ray_axes(self, size: tuple[int, int]) -> Array:
-        """Rows a, b, c, float64 (3, 3): the point at view depth 1 behind NDC (x, y) is position + a*x + b*y + c.
+        """Return rows a, b, c, float64 (3, 3): position + a*x + b*y + c is the point at view depth 1 behind NDC (x, y).
 
         `size` is (width, height) in pixels.
         """
@@ -63,7 +63,7 @@ class Camera:
         return axes
 
     def rays(self, size: tuple[int, int]) -> Array:
-        """Directions through all pixel centres, not normalised (view depth 1), float64 (H, W, 3), top row first."""
+        """Return directions through all pixel centres at view depth 1 (not unit), float64 (H, W, 3), top row first."""
         width, height = size
         a, b, c = self.ray_axes(size)
         x = (np.arange(width) + 0.5) / width * 2 - 1

@@ -1,4 +1,4 @@
-"""What a scene is: triangles, materials, a camera and one spotlight. `load` makes one from files.
+"""A scene: triangles, materials, a camera and one spotlight. `load` makes one from files.
 
 All arrays are world space. Nothing here touches OpenGL.
 """
@@ -30,7 +30,7 @@ class Texture:
 
 @dataclass(frozen=True)
 class Material:
-    """Lambertian: reflectance = albedo (linear RGB) times the texture (index into Scene.textures), if any."""
+    """A Lambertian material: reflectance is albedo (linear RGB) times texture (index into Scene.textures), if any."""
 
     name: str
     albedo: tuple[float, float, float]
@@ -39,7 +39,7 @@ class Material:
 
 @dataclass(frozen=True)
 class RenderDefaults:
-    """The scene file's [render] table: what the command line takes where it says nothing."""
+    """Defaults of the command line, from a scene file's [render] table."""
 
     graph: str | None = None
     size: tuple[int, int] | None = None
@@ -50,7 +50,7 @@ class RenderDefaults:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A loaded scene. `chosen` says what was picked for the user, `notes` what of the files is not honoured."""
+    """A loaded scene. chosen: what the loader chose for lack of it in the files; notes: what it does not honour."""
 
     name: str
     path: Path
@@ -86,14 +86,14 @@ class Scene:
 
     @property
     def moves(self) -> bool:
-        """Whether anything in it has a motion."""
+        """Whether camera, spotlight or a model has a motion."""
         return bool(self.camera.motion or self.spotlight.motion or self.geometry.moves)
 
     def at(self, time: float) -> Scene:
-        """The scene at `time` seconds, at rest there; itself where nothing moves.
+        """Return the scene as it is at `time` seconds, without motion; itself where nothing moves.
 
-        At times between which no model moves geometry is the same object. SceneError if camera or spotlight meet what
-        they look at, SettingError if the time is not finite.
+        Its geometry is the same object at times between which no model moves. Raises SceneError if camera or spotlight
+        stands where it looks at, SettingError if the time is not finite.
         """
         if not isfinite(time):
             raise SettingError(f"time {time}: must be finite, in seconds")

@@ -1,4 +1,4 @@
-"""Every format that needs nothing besides trimesh, such as PLY, STL and DAE."""
+"""Every format that needs little besides trimesh, such as PLY, STL and DAE."""
 
 from __future__ import annotations
 

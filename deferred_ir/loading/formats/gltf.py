@@ -1,4 +1,4 @@
-"""Reads the JSON of a glTF file for what trimesh loses or rounds, and hands it over in a form that trimesh reads right.
+"""Reads from a glTF file's JSON what trimesh loses or rounds, and rewrites the rest into what trimesh reads right.
 
 trimesh keeps base colours and vertex colours of bare meshes in 8 bits, drops the children of nodes with a camera, and
 skips without a word what it does not know. Here, materials get their index as their name, bare meshes get a material,
@@ -47,7 +47,7 @@ class BaseColor:
 
 @dataclass(frozen=True)
 class GltfFile:
-    """A glTF file made ready: `text` (JSON) and `assets` for trimesh; its material "3" is materials[3] here."""
+    """A glTF file prepared for trimesh: `text` (JSON) and `assets`; trimesh's material "3" is materials[3] here."""
 
     text: bytes
     assets: Assets
@@ -109,7 +109,7 @@ def read(path: Path, data: bytes, root: Path | None = None) -> GltfFile:
 
 
 def _read_buffers(document: Json, binary: bytes | None, assets: Assets) -> list[bytes]:
-    """The contents of the document's buffers; `binary` is that of the one without a URI. A file is read once."""
+    """Return the contents of the document's buffers; `binary` is that of the one without a URI. A file is read once."""
     read: dict[str | None, bytes] = {} if binary is None else {None: binary}
     buffers = []
     for index, buffer in enumerate(document.get("buffers", [])):
@@ -135,7 +135,7 @@ def _read_content(where: str, uri: Any, assets: Assets) -> bytes:
 
 
 def _split_chunks(data: bytes) -> tuple[bytes, bytes]:
-    """The JSON and the first binary chunk of a GLB."""
+    """Return the JSON and the first binary chunk of a GLB."""
     _, version, _ = struct.unpack_from("<4sII", data)
     if version != 2:
         raise ValueError(f"GLB version {version} instead of 2")
@@ -173,7 +173,7 @@ def _refuse(document: Json) -> None:
 
 
 def _find_notes(document: Json) -> Iterator[str]:
-    """What of the file is not honoured."""
+    """Yield notes on what of the file is not honoured."""
     used = {*document.get("extensionsUsed", []), *document.get("extensionsRequired", [])}
     if ignored := used - HONOURED - ELSEWHERE - COMPRESSED:
         yield f"not honoured: {', '.join(sorted(ignored))}"
@@ -204,7 +204,7 @@ def _find_notes(document: Json) -> Iterator[str]:
 
 
 def _find_base(material: Json) -> Json:
-    """The table that holds a material's baseColorFactor and baseColorTexture."""
+    """Return the table that holds a material's baseColorFactor and baseColorTexture."""
     glossy = material.get("extensions", {}).get(GLOSSY)
     if glossy is not None and "pbrMetallicRoughness" not in material:
         names = (("diffuseFactor", "baseColorFactor"), ("diffuseTexture", "baseColorTexture"))
@@ -214,7 +214,7 @@ def _find_base(material: Json) -> Json:
 
 
 def _prepare(document: Json) -> tuple[BaseColor, ...]:
-    """Change `document` into what trimesh reads right; returns its materials."""
+    """Change `document` into what trimesh reads right. Returns its materials."""
     materials = document.setdefault("materials", [])
     bare = [primitive for primitive in _iterate_primitives(document) if "material" not in primitive]
     if bare:
@@ -228,8 +228,8 @@ def _prepare(document: Json) -> tuple[BaseColor, ...]:
             document["images"][index] = {}  # trimesh need not read images that nobody uses
     for index, material in enumerate(materials):
         base = _find_base(material)
-        kept = {"baseColorTexture": base["baseColorTexture"]} if "baseColorTexture" in base else {}
-        materials[index] = {"name": str(index), "pbrMetallicRoughness": kept}
+        reduced = {"baseColorTexture": base["baseColorTexture"]} if "baseColorTexture" in base else {}
+        materials[index] = {"name": str(index), "pbrMetallicRoughness": reduced}
     for node in document.get("nodes", []):
         node.pop("camera", None)
     if "scenes" not in document:

@@ -1,6 +1,6 @@
-"""Holds a glTF document's numbers against each other before trimesh reads by them: sizes, offsets, indices, the tree.
+"""Checks the sizes, offsets, indices and node tree of a glTF document before trimesh reads it.
 
-trimesh takes nodes in rings, indices counted from the end and copies without bound as they come.
+trimesh accepts cyclic nodes, negative indices and unbounded copies.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def _get_integer(where: str, table: Json, key: str, default: int | None = None, 
 
 
 def _check_view(where: str, view: Json, buffers: Sequence[bytes]) -> int:
-    """The length of a view, which lies within its buffer."""
+    """Return the length of a view after checking that it lies within its buffer."""
     start, length = _get_integer(where, view, "byteOffset", 0), _get_integer(where, view, "byteLength", least=1)
     there = len(buffers[_get_index(where, view, "buffer", len(buffers))])
     if start + length > there:
@@ -97,7 +97,7 @@ def _check_accessor(where: str, accessor: Json, views: list[Json], lengths: list
 
 
 def _count_mesh(where: str, mesh: Json, document: Json) -> int:
-    """Vertices and indices of a mesh."""
+    """Return the number of vertices and indices of a mesh."""
     accessors, total = _get_list(document, "accessors"), 0
     for number, primitive in enumerate(_get_list(mesh, "primitives")):
         name = f"{where}.primitives[{number}]"
@@ -111,7 +111,7 @@ def _count_mesh(where: str, mesh: Json, document: Json) -> int:
 
 
 def _check_tree(nodes: list[Json]) -> None:
-    """Nodes are trees: each has one parent at most, none is its own ancestor, and none lies too deep."""
+    """Check that nodes form trees: each has at most one parent, none is its own ancestor, and none lies too deep."""
     parents: dict[int, int] = {}
     for index, node in enumerate(nodes):
         for child in node.get("children", []):

@@ -1,4 +1,4 @@
-"""What every format of model files answers about the meshes that trimesh reads from it."""
+"""The interface of formats of model files: what trimesh reads, and the appearance of its meshes."""
 
 from __future__ import annotations
 

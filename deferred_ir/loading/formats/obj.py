@@ -1,4 +1,4 @@
-"""What trimesh passes over in OBJ and MTL files, mended before it reads them.
+"""Corrects OBJ and MTL files before trimesh reads them, for what it passes over.
 
 trimesh knows one `mtllib`, finds the word even in a comment, counts negative indices from the end of the whole file,
 skips missing materials and images without a word, and rounds Kd to 8 bits.
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.errors import SceneError
-from deferred_ir.loading.asset_paths import Assets, without_options
+from deferred_ir.loading.asset_paths import Assets, strip_options
 from deferred_ir.loading.formats.model_format import ModelFormat, Reflectance, choose_plain_albedo
 from deferred_ir.loading.model_data import check_albedo
 
@@ -22,7 +22,7 @@ MATERIALS = "materials.mtl"
 
 @dataclass(frozen=True)
 class MtlMaterial:
-    """What we take of a material: the numbers of Kd (unrounded, may be none), its image, and whether it emits."""
+    """An MTL material: the numbers of Kd (unrounded, none if it has none), its image, and whether it emits."""
 
     kd: tuple[float, ...] = ()
     image: str | None = None
@@ -31,7 +31,7 @@ class MtlMaterial:
 
 @dataclass(frozen=True)
 class ObjFile:
-    """An OBJ file made ready: text for trimesh, its assets, its materials by name, and notes."""
+    """An OBJ file prepared for trimesh: its text, assets, materials by name, and notes."""
 
     text: bytes
     assets: Assets
@@ -83,14 +83,14 @@ def read(path: Path, data: bytes, root: Path | None = None) -> ObjFile:
             if found.parent not in assets.folders:
                 assets.folders.append(found.parent)
     materials = _read_materials("\n".join(libraries))
-    # A value that trimesh does not expect, of whatever key, would cost it all materials: it gets names and images only.
+    # trimesh drops all materials over one value that it does not expect, so it gets names and images only.
     lines = ((f"newmtl {name}", f"map_Kd {m.image}" if m.image else "") for name, m in materials.items())
     assets.blobs[MATERIALS] = "\n".join(line for pair in lines for line in pair).encode()
     used = {" ".join(name.split()) for name in re.findall(r"^usemtl[ \t]+(.*)", text, re.MULTILINE)}
     if missing := sorted(used - materials.keys()):
         notes.append(f"{path.name}: no material {', '.join(missing)}; its surfaces are grey")
     text = re.sub(r"^.*\bmtllib\b.*$", "", text, flags=re.MULTILINE)
-    text = f"mtllib {MATERIALS}\n{_make_indices_make_absolute(text)}"
+    text = f"mtllib {MATERIALS}\n{_make_indices_absolute(text)}"
     if re.search(r"^f[^\n#]*[ \t/](0+|-\d+)(?![\d.])", text, re.MULTILINE):
         raise SceneError(
             f"{path}: a face has index 0, or one before the first vertex; export it again, counting from 1"
@@ -107,12 +107,12 @@ def _decode(data: bytes) -> str:
 
 
 def _split_library_names(names: str, assets: Assets) -> list[str]:
-    """The files of one `mtllib` line: one name with spaces, or several names."""
+    """Return the files of one `mtllib` line: one name with spaces, or several names."""
     return [names] if assets.path(names) or " " not in names else names.split()
 
 
 def _read_materials(mtl: str) -> dict[str, MtlMaterial]:
-    """The materials of an MTL text by name; of two of one name the later counts."""
+    """Read the materials of an MTL text by name; of two with the same name the later counts."""
     materials: dict[str, MtlMaterial] = {}
     name = ""
     for line in mtl.splitlines():
@@ -124,22 +124,22 @@ def _read_materials(mtl: str) -> dict[str, MtlMaterial]:
         elif name and key == "kd":
             materials[name] = replace(materials[name], kd=_parse_numbers(value))
         elif name and key == "map_kd" and value.strip():
-            materials[name] = replace(materials[name], image=without_options(value).strip())
+            materials[name] = replace(materials[name], image=strip_options(value).strip())
         elif name and key == "ke":
             materials[name] = replace(materials[name], emits=any(number > 0 for number in _parse_numbers(value)))
     return materials
 
 
 def _parse_numbers(text: str) -> tuple[float, ...]:
-    """The numbers of a line up to a comment; none where something else stands there, such as `spectral file.rfl`."""
+    """Return the numbers of a line before its comment; none for anything else, such as `spectral file.rfl`."""
     try:
         return tuple(float(word) for word in text.partition("#")[0].split())
     except ValueError:
         return ()
 
 
-def _make_indices_make_absolute(text: str) -> str:
-    """The text with negative face indices, which count back from the latest vertex, turned into plain ones."""
+def _make_indices_absolute(text: str) -> str:
+    """Replace negative face indices, which count back from the latest vertex, by positive ones."""
     if not re.search(r"^[ \t]*f[^\n#]*[ \t/]-\d", text, re.MULTILINE):
         return text
     counts = {"v": 0, "vt": 0, "vn": 0}
@@ -157,7 +157,7 @@ def _make_indices_make_absolute(text: str) -> str:
 
 
 def _make_absolute(reference: str, totals: tuple[int, ...]) -> str:
-    """One vertex of a face, such as `-4/-4/-1`, with the numbers of vertices, uvs and normals so far."""
+    """Return one vertex of a face, such as `-4/-4/-1`, counted from 1. totals: vertices, uvs, normals so far."""
     parts = reference.split("/")
     for place, (part, total) in enumerate(zip(parts, totals, strict=False)):
         if re.fullmatch(r"-\d+", part):

@@ -1,4 +1,4 @@
-"""The assignment's way, kept as the baseline: the scene is drawn for each light and added up by blending.
+"""Forward shading, the assignment's method and the baseline: draw the scene once for each light and blend.
 
 lights, vpls, depth and primitives of visible_faces, a plain depth map for each light -> radiance. Positions are
 interpolated from the vertices; nothing comes from a G-buffer.
@@ -50,16 +50,16 @@ class Forward(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Radiance in 32 bits: 256 terms drown in a half float."""
+        """Radiance in 32 bits: a half float would lose the smaller of 256 terms."""
         del inputs
         return {"radiance": Output("reflected radiance, linear RGB; 0 on the background", Texture("rgba32f"))}
 
     def depends(self) -> frozenset[str]:
-        """The scene is drawn from the camera."""
+        """The camera and the models; the lights come as inputs."""
         return frozenset({"camera", "models"})
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Draw the scene for each light, and for each group of VPLs."""
+        """Draw the scene for each direct light and for each group of VPLs."""
         ctx = io.gpu.ctx
         io.framebuffer.clear_color()
         ctx.enable(ctx.DEPTH_TEST | ctx.BLEND)
@@ -105,7 +105,7 @@ class Forward(Pass):
 
 
 def _groups(vpls: np.ndarray, size: int) -> Iterator[Ints]:
-    """Yield the rows of VPL records (n,) that each draw adds up, those with power. No draw's are of two blocks."""
+    """Yield the rows of VPL records (n,) that each draw adds up: of one block, without dark VPLs."""
     lit = find_shining(vpls)
     for start in range(0, len(vpls), VPLS_PER_BLOCK):
         for first in range(start, min(start + VPLS_PER_BLOCK, len(vpls)), size):

@@ -1,4 +1,4 @@
-"""VPLs that outlive their frame (Laine et al. 2007): -> vpls, as the pass vpl writes them, and which of them are new.
+"""Incremental instant radiosity (Laine et al. 2007): -> vpls, with versions that say which of them are new.
 
 A few VPLs are new in each frame, the others stay where they are and keep their tile of the atlas, so that only the new
 ones need a map. They end where scene, seed or parameters are others, or the spotlight is turned off.
@@ -27,10 +27,14 @@ VPLS_WAITING = Figure("vpls_waiting", "Rays for VPLs that no frame has cast yet.
 
 @dataclass(frozen=True)
 class Params(VplParams):
-    """Parameters of VPLs that stay."""
+    """Parameters of VPLs that outlive their frame."""
 
-    least: int = param(4, lo=0, hi=65536, doc="VPLs that a frame may replace to spread them better; at most `most`.")
-    most: int = param(8, lo=0, hi=65536, doc="Most new VPLs in a frame, and so most maps of VPLs that it draws.")
+    least: int = param(
+        4, lo=0, hi=65536, doc="VPLs that a frame may replace to improve their distribution; at most `most`."
+    )
+    most: int = param(
+        8, lo=0, hi=65536, doc="Limit on the new VPLs in a frame, and so on the maps of VPLs that it draws."
+    )
 
 
 @dataclass

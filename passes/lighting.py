@@ -51,7 +51,7 @@ class Lighting(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Radiance in 32 bits: 256 terms drown in a half float."""
+        """Radiance in 32 bits: a half float would lose the smaller of 256 terms."""
         del inputs
         return {
             "radiance": Output(
@@ -60,11 +60,11 @@ class Lighting(Pass):
         }
 
     def depends(self) -> frozenset[str]:
-        """Positions come back from the depth, which the near plane scales."""
+        """The camera and, through the near plane, the scene: positions are reconstructed from the depth."""
         return frozenset({"camera", "models"})
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """One fullscreen draw a block of VPLs, or one a tile of the screen with the VPLs that may reach it."""
+        """Draw the frame once for each block of VPLs, or tile by tile with the VPLs that may light the tile."""
         lights, vpls = io["lights"], io["vpls"].records
         lights.bind()
         if io["views"]:
@@ -76,7 +76,7 @@ class Lighting(Pass):
         io.gpu.ctx.blend_func = io.gpu.ctx.ONE, io.gpu.ctx.ONE
         if io["indirect"]:
             vpls = vpls[:0]
-        # A GPU would wait for the depth, and has a light's arithmetic for less than a draw.
+        # On a GPU, reading the depth back would stall, and a draw costs more than the VPLs that it skips.
         if len(vpls) >= FEWEST and io.gpu.device.kind == "software" and not frame.keep_all:
             self._draw_tiles(frame, io, program, vpls)
         else:
@@ -96,8 +96,8 @@ class Lighting(Pass):
             self._draw(io, program, first=start == 0, count=min(len(lit) - start, VPLS_PER_BLOCK))
 
     def _draw_tiles(self, frame: Frame, io: Io, program: Program, vpls: np.ndarray) -> None:
-        """Draw the frame tile by tile, without the VPLs that a tile lies behind: they would add nothing."""
-        tiles = Tiles.of(io["depth"].read()[..., 0], frame.scene.camera, frame.near)
+        """Draw the frame tile by tile, without the VPLs that add nothing to the tile."""
+        tiles = Tiles.build(io["depth"].read()[..., 0], frame.scene.camera, frame.near)
         packed, draws = list_draws(tiles, vpls)
         io.gpu.ctx.finish()  # maps that are still being drawn would be timed with what comes after this pass
         buffer = io.gpu.uniforms(packed.tobytes())
@@ -109,7 +109,7 @@ class Lighting(Pass):
         io.count(LIGHTS_SKIPPED.name, len(tiles.rectangles) * len(vpls) - sum(draw.count for draw in draws))
 
     def _draw(self, io: Io, program: Program, *, first: bool, count: int) -> None:
-        """Draw `count` VPLs of the bound block; the first draw of a pixel has the direct lights, later ones add up."""
+        """Draw `count` VPLs of the bound block. The first draw of a pixel adds the direct lights; later draws blend."""
         if not first:
             io.gpu.ctx.enable(io.gpu.ctx.BLEND)
         program.set(direct=len(io["lights"].records) if first else 0, count=count)
@@ -117,7 +117,7 @@ class Lighting(Pass):
 
 
 def _bind(buffer: Any, start: int) -> None:
-    """Make the VPL records from `start` on visible as a block."""
+    """Bind the VPL records from `start` on as the uniform block of VPLs."""
     buffer.bind_to_uniform_block(BINDING, offset=start * VPL.itemsize, size=VPLS_PER_BLOCK * VPL.itemsize)
 
 

@@ -17,7 +17,7 @@ from deferred_ir.scene.scene import Scene
 
 
 class Lights(Pass):
-    """The direct lights, without the power of those that light nothing which the camera sees."""
+    """The direct lights; those that light nothing in view have their power set to 0."""
 
     State = LightVersions
     figures = (LIGHTS_DROPPED,)
@@ -28,7 +28,7 @@ class Lights(Pass):
         return {"lights": describe_output()}
 
     def depends(self) -> frozenset[str]:
-        """The lights, and for the versions of their maps what moves in front of them."""
+        """The lights, and the models, which may move in front of them."""
         return frozenset({"light", "models"})
 
     def execute(self, frame: Frame, io: Io) -> None:
@@ -43,7 +43,7 @@ class Lights(Pass):
 
 
 def _cones(scene: Scene) -> np.ndarray:
-    """Return the lights' cones as the pyramids about them, AXES (n,)."""
+    """Return the pyramids about the lights' cones, AXES (n,)."""
     light = scene.spotlight
     cones = np.zeros(1, AXES)
     cones["position"] = light.position

@@ -1,9 +1,9 @@
 """Shadow maps of all lights in one depth texture array: lights, vpls -> atlas, views.
 
-One pass over all lights, for they are too many and too volatile for a node each. A view of a direct light owns a layer,
-each VPL a tile on the layers behind them. The pass plans a sub-pass for each map and draws the dirty ones in one
-indirect call a block of VPLs, each cluster of triangles once for every view that may see it: the vertex shader chooses
-layer and tile, four clip distances cut the tile out.
+Each view of a direct light has a layer of the atlas, each VPL a tile on the layers behind these. The pass plans a
+sub-pass for each map. It draws the dirty maps of a block of VPLs by one indirect call, in which each cluster of
+triangles has an instance for every view that may see it: the vertex shader chooses layer and tile, and four clip
+distances clip to the tile.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from deferred_ir.shadows.views import describe_output, pack_views
 
 
 class ShadowMaps(Pass):
-    """Depth as each light sees it."""
+    """Depth from each light."""
 
     Params = MapParams
     figures = figures.ALL
@@ -49,7 +49,7 @@ class ShadowMaps(Pass):
         return edge
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """The atlas, as large as the lights need, and where in it the views of direct lights are."""
+        """The atlas, as large as the lights need, and the views of the direct lights."""
         vpls, edge, per_layer = _count_vpls(inputs), self._edge(), self._tiles_per_layer()
         layers = CAPACITY + -(-vpls // per_layer)
         layer = 4 * edge * edge
@@ -64,17 +64,17 @@ class ShadowMaps(Pass):
         return {"atlas": Output(doc, atlas, defines), "views": describe_output()}
 
     def unneeded(self, facts: Facts) -> str | None:
-        """A dark spotlight makes no VPLs either."""
+        """Return a reason if the spotlight is dark: then there are no VPLs either."""
         return None if facts[EMITS] else "no light needs one: the spotlight emits nothing"
 
     def depends(self) -> frozenset[str]:
-        """Where the lights are, besides what is in their way."""
+        """The lights and the models; VPLs come as an input."""
         return frozenset({"light", "models"})
 
     def subpasses(
         self, inputs: Mapping[str, Description | None], state: AtlasCache | None = None
     ) -> Sequence[Mapping[str, Any]]:
-        """A sub-pass for each light that the buffers can hold; after a frame, for each that they hold."""
+        """Return a sub-pass for each map that the buffers have room for; after a frame, for each of its lights."""
         per_layer, why = self._tiles_per_layer(), "no frame has drawn it yet"
         spot = {"light": "spotlight", "projection": "perspective", "layer": 0, "tile": 0, "size": self.params.spot_size}
         tiles = [
@@ -86,7 +86,7 @@ class ShadowMaps(Pass):
         return state.describe(parts) if state and state.frame else parts
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Clear, then draw for each light what it may see, unless its map is there already."""
+        """Clear and draw the maps that the atlas does not hold already."""
         views, vpls = pack_views(frame, self.params, self._edge()), io["vpls"].records
         io["views"].write(views)
         maps = AtlasCache.begin(io, self.params, all_tiles=frame.keep_all)

@@ -1,6 +1,6 @@
-"""Shadow maps the plain way, for the baseline: lights, vpls -> views and one depth texture for each map.
+"""Shadow maps of the baseline: lights, vpls -> views and one depth texture for each map.
 
-Drawn one by one with nothing of the atlas, so that a fault in its tiles cannot hide from the comparison.
+They are drawn one by one and share nothing with the atlas, so that the equivalence test can find a fault in its tiles.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class SingleMaps(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """A texture for each map that there may be."""
+        """A texture for each map that the buffers may need."""
         vpls, p = inputs["vpls"], self.params
         count = vpls.records if isinstance(vpls, Buffer) else 0
         single, room = 4 * p.vpl_size**2, p.budget * 2**20 - 4 * CAPACITY * p.spot_size**2
@@ -53,11 +53,11 @@ class SingleMaps(Pass):
         }
 
     def unneeded(self, facts: Facts) -> str | None:
-        """A dark spotlight makes no VPLs either."""
+        """Return a reason if the spotlight is dark: then there are no VPLs either."""
         return None if facts[EMITS] else "no light needs one: the spotlight emits nothing"
 
     def depends(self) -> frozenset[str]:
-        """Where the lights are, besides what is in their way."""
+        """The lights and the models; VPLs come as an input."""
         return frozenset({"light", "models"})
 
     def execute(self, frame: Frame, io: Io) -> None:

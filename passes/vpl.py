@@ -24,15 +24,18 @@ from deferred_ir.vpls.resampling import estimate_effects, find_probes, resample
 
 @dataclass(frozen=True)
 class Params(CastParams):
-    """Parameters of VPLs that are cast anew in each frame, among them how many candidates each is chosen from."""
+    """Parameters of VPLs that are cast anew in each frame."""
 
     candidates: int = param(
-        1, lo=1, hi=64, doc="Rays for each VPL that is kept, chosen by what it adds to the image. 1: all are kept."
+        1,
+        lo=1,
+        hi=64,
+        doc="Candidates for each VPL, one of which is chosen by its contribution to the image. 1: use all.",
     )
 
 
 class Vpl(Pass):
-    """Traces `count` rays from the spotlight, or more and chooses, and packs what they make for the shaders."""
+    """Traces `count` rays from the spotlight, or more to choose from, and packs the VPLs for the shaders."""
 
     Params = Params
     figures = (VPLS_ALIVE, LIGHTS_DROPPED)
@@ -43,7 +46,7 @@ class Vpl(Pass):
         warn_unbalanced(self.params.pattern, self.params.count)
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """One buffer with room for a VPL for each ray of each bounce."""
+        """One buffer with room for a VPL per ray and bounce."""
         del inputs
         return {"vpls": describe_output(self.params, self.params.bounces)}
 

@@ -19,7 +19,7 @@ NEAR = 1e-8
 """Near planes of camera and lights, as a fraction of the scene's scale: what is nearer is cut away.
 
 Walls so close to a light that they are cut let light through. A light's own surface, which roundings put a little
-before or behind it, is kept out of its map by lifting the light off instead (frame/vpl_buffer.off_surface,
+before or behind it, is kept out of its map by lifting the light off instead (frame/vpl_buffer.lift_off_surface,
 shadows/views.py). Depths, near / distance in 32-bit floats, have the same relative precision whatever the
 near plane.
 """

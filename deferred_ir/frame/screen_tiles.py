@@ -1,7 +1,7 @@
-"""Which VPLs may light which tiles of the screen, by the depths that a tile shows. No OpenGL.
+"""Tiled light culling: which VPLs may light which tiles of the screen. No OpenGL.
 
-What a tile's pixels show lies in a frustum: the tile's pyramid between its smallest and its largest depth. A VPL that
-has this frustum behind it, or outside the pyramid about its cone, adds exactly nothing to any of them.
+The surfaces in a tile lie in a frustum between its smallest and its largest depth. A VPL adds exactly nothing to a tile
+whose frustum lies behind it, or outside the pyramid about its cone.
 """
 
 from __future__ import annotations
@@ -17,25 +17,30 @@ from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 from deferred_ir.scene.camera import Camera
 
 EDGE = 64
-"""Of a tile, pixels: a software driver's own. Smaller ones skip a few more VPLs, and cost more draws than that wins."""
+"""Edge of a tile in pixels, as of llvmpipe's own tiles. Smaller tiles skip a few more VPLs, but cost more
+in draws than that saves."""
 
 ALIGNED = 16
-"""Lists of lights begin at multiples of so many records: 1280 bytes, since uniform blocks begin at multiples of 256."""
+"""Lists of VPLs begin at multiples of this many records, 1280 bytes: uniform blocks must begin at multiples of 256."""
 FEWEST = 8
 """Fewest VPLs for which culling by tile pays."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tiles:
-    """Tiles that show a surface. rectangles: int (t, 4), x, y, width and height; corners: float32 (8, t, 3), world."""
+    """Tiles that show a surface.
+
+    rectangles: int (t, 4), x, y, width and height in pixels. corners: float32 (8, t, 3), of their frustums, in world
+    space. margin: float32 (t,), by which rounding may move their pixels.
+    """
 
     rectangles: Ints
     corners: Array
     margin: Array
 
     @classmethod
-    def of(cls, depth: Array, camera: Camera, near: float) -> Tiles:
-        """From reversed depths (H, W), bottom row first, 0 where there is no surface. near: the near plane."""
+    def build(cls, depth: Array, camera: Camera, near: float) -> Tiles:
+        """Build tiles from reversed depths (H, W), bottom row first, 0 on the background. near: the near plane."""
         height, width = depth.shape
         columns, rows = (np.arange(0, length, EDGE) for length in (width, height))
         farthest = np.where(depth > 0, depth, np.inf)
@@ -57,7 +62,7 @@ class Tiles:
         reach = np.abs(offsets).max(axis=(0, 2)) + np.abs(camera.position).max()
         return cls(rectangles, (offsets + camera.position).astype(np.float32), (MARGIN * reach).astype(np.float32))
 
-    def lit(self, vpls: np.ndarray) -> Bools:
+    def find_lit(self, vpls: np.ndarray) -> Bools:
         """Return which tiles each of the VPLs may light, bool (t, n). vpls: VPL (n,)."""
         x, y, z = (vpls[axis] for axis in ("x_axis", "y_axis", "z_axis"))
         position = vpls["position"]
@@ -71,7 +76,7 @@ class Tiles:
 
 @dataclass(frozen=True)
 class Draw:
-    """One draw: a tile, and the VPLs that it adds up in the packed records.
+    """One draw: a tile, and the VPLs of the packed records that it adds up.
 
     start, count: where its list of VPLs begins, and how many they are. first: it is the tile's first draw.
     """
@@ -85,11 +90,11 @@ class Draw:
 def list_draws(tiles: Tiles, records: np.ndarray) -> tuple[np.ndarray, list[Draw]]:
     """Return lists of VPLs for the tiles, from VPL records (n,), as packed records (m,) and the draws that read them.
 
-    A tile has a draw for each block of the buffer in which a VPL may light it, with these VPLs in their order, so that
-    its sums are the same; the first block's it has in any case. Lists begin at multiples of 256 bytes, and have a whole
-    block of records behind them.
+    A tile has a draw for each block of the buffer with VPLs that may light it, in their order, so that its sums stay
+    the same; the first block always has one. Lists begin at multiples of 256 bytes and are followed by a whole block of
+    records.
     """
-    chosen = tiles.lit(records) & find_shining(records)
+    chosen = tiles.find_lit(records) & find_shining(records)
     rows, draws, end = [], list[Draw](), 0
     for start in range(0, max(len(records), 1), VPLS_PER_BLOCK):
         block = chosen[:, start : start + VPLS_PER_BLOCK]

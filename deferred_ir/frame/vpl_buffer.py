@@ -39,7 +39,7 @@ VPLS_PER_BLOCK = 192
 """VPLs in a uniform block: OpenGL promises 16 KiB (204 VPLs), and blocks must start at multiples of 256 bytes."""
 
 ROUNDINGS = 8
-"""Of a coordinate: what a VPL's surface and its map may be apart by, with positions and their products rounded."""
+"""Distance between a VPL and its surface, in roundings of a 32-bit coordinate: positions and products are rounded."""
 
 
 @dataclass(frozen=True)
@@ -60,13 +60,13 @@ def describe_output(params: VplParams, bounces: int = 1) -> Output:
 
 
 DEFINES = {"VPLS_BINDING": BINDING, "VPLS_PER_BLOCK": VPLS_PER_BLOCK}
-"""What readers of a buffer of VPLs need to know."""
+"""Defines for the shaders that read a buffer of VPLs."""
 
 
 def pack_vpls(scene: Scene, vpls: Vpls, params: VplParams, tiles: Ints) -> np.ndarray:
     """Return VPL records (n,). tiles: int (n,), of their maps in the atlas."""
     records = np.zeros(len(vpls), VPL)
-    records["position"] = off_surface(scene, vpls.position, vpls.normal)
+    records["position"] = lift_off_surface(scene, vpls.position, vpls.normal)
     records["emission"], records["tile"] = vpls.emission, tiles
     records["clamp_squared"] = (params.clamp_fraction * scene.geometry.diagonal) ** 2
     records["one_minus_cos"] = one_minus_cos(params.fov)
@@ -103,8 +103,8 @@ def read_limits(records: np.ndarray) -> VplLimits:
     return VplLimits(clamp=math.sqrt(records["clamp_squared"][0]), cosine=1 - float(records["one_minus_cos"][0]))
 
 
-def off_surface(scene: Scene, position: Array, normal: Array) -> Array:
-    """Where VPLs stand, (n, 3): off their surfaces by its roundings, or their maps would show these here and there."""
+def lift_off_surface(scene: Scene, position: Array, normal: Array) -> Array:
+    """Return positions (n, 3) of VPLs moved off their surfaces: rounding would draw these into the maps in places."""
     size = np.maximum(np.abs(position).max(axis=1, keepdims=True), scene.geometry.scale)
     lifted: Array = position + normal * (ROUNDINGS * 2.0**-24 * size)
     return lifted

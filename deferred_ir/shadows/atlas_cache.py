@@ -18,10 +18,10 @@ from deferred_ir.shadows.settings import MapParams
 
 @dataclass(frozen=True)
 class FrameMaps:
-    """The maps of one frame: those of the direct lights' views, then those of the VPLs.
+    """The maps of one frame: first those of the direct lights' views, then those of the VPLs.
 
-    places, versions: int (n,); without versions every map is drawn in every frame. shining: bool (n,), which lights
-    have power, and so need a map. dirty: bool (n,), which maps must be drawn.
+    places, versions: int (n,); without versions every frame draws every map. shining: bool (n,), lights that have power
+    and therefore need a map. dirty: bool (n,), maps that must be drawn.
     """
 
     places: Ints
@@ -31,11 +31,10 @@ class FrameMaps:
 
 
 class AtlasCache:
-    """What an atlas holds, from frame to frame. The first places are the layers of views of direct lights, behind
-    them come the tiles of the VPLs.
+    """The maps that an atlas holds from frame to frame, by place: layers of direct lights first, then tiles of VPLs.
 
-    params: with which its maps were drawn. versions: int (all places,), the version of the light whose map is in each
-    place, 0 for none.
+    params: the parameters that the maps were drawn with. versions: int (places,), the version of the light whose map is
+    in each place; 0 if there is none.
     """
 
     def __init__(self) -> None:
@@ -47,8 +46,8 @@ class AtlasCache:
     def begin(io: Io, params: MapParams, *, all_tiles: bool) -> FrameMaps:
         """Clear the places whose maps this frame must draw, or the whole atlas, and return the frame's maps.
 
-        all_tiles: there is room for all lights that there may ever be; otherwise for those of the frame, unless their
-        maps are to be used again.
+        all_tiles: give the atlas room for every light that there may ever be. Otherwise it has room for the lights of
+        the frame, unless their maps can be used again.
         """
         atlas, lights, vpls = io["atlas"], io["lights"], io["vpls"]
         tiles = vpls.records["tile"].astype(int)

@@ -1,4 +1,4 @@
-"""What all passes that draw planar shadow maps share: their parameters and what readers must know of them."""
+"""Parameters of the passes that draw shadow maps, and the limits that they check."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from deferred_ir.base.errors import GraphError
 from deferred_ir.graph.params import param
 
 MOST_LAYERS = 2048
-"""Of an array texture: what every driver of OpenGL 4.3 takes."""
+"""Layers of an array texture that every driver of OpenGL 4.3 supports."""
 
 LEAST_REACH = 2.0
-"""In paraboloid maps triangles nearer than this, in lengths of their edges, are split, however small the map is."""
+"""Paraboloid maps always split triangles nearer than this, in lengths of their edges, however small the map is."""
 
 
 @dataclass(frozen=True)
@@ -25,31 +25,35 @@ class MapParams:
     spot_size: int = param(2048, lo=16, hi=16384, doc="Width and height of the spotlight's map, texels.")
     vpl_size: int = param(256, lo=16, hi=4096, doc="Width and height of a VPL's map, texels.")
     projection: Literal["perspective", "paraboloid"] = param(
-        "perspective", doc="Of the VPLs' maps. The spotlight's is a paraboloid where it is wider than 140 degrees."
+        "perspective",
+        doc="Projection of the VPLs' maps. The spotlight's map is a paraboloid if its cone is wider than 140 degrees.",
     )
     bend: float = param(
-        2.0, lo=0.1, hi=16.0, doc="Paraboloid maps: edges that may be off by more texels than this are split."
+        2.0,
+        lo=0.1,
+        hi=16.0,
+        doc="Paraboloid maps: split edges that may deviate from their true curve by more than this, texels.",
     )
     tessellation: Literal["adaptive", "pre"] = param(
         "adaptive",
-        doc="Paraboloid maps of VPLs: split in each map what bends there, or draw a mesh without long edges straight.",
+        doc="Paraboloid maps of VPLs: adaptive splits bent edges in each map; pre draws a mesh of short edges.",
     )
     edge: float = param(0.05, lo=1e-4, hi=1.0, doc="Longest edge of that mesh, as a fraction of the scene's diagonal.")
     vpl_deviation: float = param(
         0.0,
         lo=0.0,
         hi=16.0,
-        doc="VPLs' maps draw a scene that is off by no more than this, texels in the middle of the map. 0: the scene.",
+        doc="Level of detail in VPLs' maps: largest deviation, in texels in the middle of the map. 0: the full scene.",
     )
     cull: Literal["none", "front"] = param(
-        "none", doc="front: draw back faces only, which moves the bias to the dark side; for closed meshes."
+        "none", doc="front: draw only back faces, which moves the bias to the unlit side; for closed meshes."
     )
-    budget: int = param(1280, lo=1, hi=65536, doc="Most memory that the maps may take, MiB.")
+    budget: int = param(1280, lo=1, hi=65536, doc="Memory limit for the maps, MiB.")
 
     def check_budget(self, vpls: int, nbytes: int, fits: int) -> None:
-        """Raise GraphError if maps for `vpls` VPLs, `nbytes` in all, go beyond the budget; `fits` VPLs would not.
+        """Raise GraphError if maps for `vpls` VPLs exceed the budget, or if parameters contradict each other.
 
-        And if parameters contradict each other.
+        nbytes: of all maps. fits: how many VPLs would be within the budget.
         """
         if self.vpl_deviation > 0 and self.projection == "paraboloid" and self.tessellation == "pre":
             raise GraphError(
@@ -70,7 +74,7 @@ class MapParams:
             )
 
     def check_layers(self, vpls: int, layers: int, tiles: int) -> None:
-        """Raise GraphError if an atlas has too many layers; VPLs have `tiles` on each but the first."""
+        """Raise GraphError if an atlas needs too many layers. tiles: of VPLs on a layer; the first layer has none."""
         if layers > MOST_LAYERS:
             raise GraphError(
                 f"maps for {vpls} VPLs of {self.vpl_size}x{self.vpl_size} need {layers} layers, and there are "
@@ -83,7 +87,7 @@ class MapParams:
         return {"VPL_PARABOLOID": int(self.projection == "paraboloid"), "VPL_SIZE": self.vpl_size}
 
     def tolerance(self, records: np.ndarray) -> Array:
-        """Return `vpl_deviation` in lengths of the way from each VPL, (n,). records: VPL (n,).
+        """Return `vpl_deviation` as a fraction of the distance from each VPL, (n,). records: VPL (n,).
 
         A texel is widest in the middle of a map.
         """
@@ -103,7 +107,7 @@ class MapParams:
         return least
 
     def prepare(self, gpu: Any) -> None:
-        """OpenGL state for drawing maps in reversed depth."""
+        """Set the OpenGL state for drawing maps in reversed depth."""
         ctx = gpu.ctx
         ctx.enable(ctx.DEPTH_TEST)
         ctx.depth_func = ">"

@@ -31,7 +31,7 @@ WIDEST_PLANAR = 140.0
 """A light wider than this, in degrees, gets a paraboloid map: the planar one has few texels for its middle."""
 LIFT = np.float32(100.0)
 """Near planes: a millionth of the scene. A light may hang in a surface, whose roundings must not hide what it looks at;
-VPLs have been lifted off theirs (frame/vpl_buffer.off_surface)."""
+VPLs have been lifted off theirs (frame/vpl_buffer.lift_off_surface)."""
 
 
 def describe_output() -> Output:

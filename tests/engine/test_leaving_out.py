@@ -226,7 +226,7 @@ def test_tiles_that_show_nothing_are_not_drawn(renderer):
     scene = build(plane(), camera=Camera((0.0, 3.0, 0.1), (2.0, 0.0, 0.0), fov=70.0))
     (image, _, _), (full, _, _) = both(renderer, scene, "deferred", vpls=16, size=(192, 192))
     assert same_pixels(image, full)
-    camera = Tiles.of(np.where(np.arange(192) > 100, 0.5, 0.0)[None].repeat(192, axis=0), scene.camera, 0.1)
+    camera = Tiles.build(np.where(np.arange(192) > 100, 0.5, 0.0)[None].repeat(192, axis=0), scene.camera, 0.1)
     assert sorted(set(camera.rectangles[:, 0].tolist())) == [64, 128]
 
 

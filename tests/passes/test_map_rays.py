@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from map_rays import tiles, wrong_texels
 from small_scenes import build, triangle_soup
 
-from deferred_ir.frame.vpl_buffer import VPL, off_surface
+from deferred_ir.frame.vpl_buffer import VPL, lift_off_surface
 from deferred_ir.loading.load import builtin_scenes, load
 from deferred_ir.rays.tracer import Tracer
 
@@ -40,7 +40,7 @@ def anywhere(scene, rng, fov, on_faces):
     faces = rng.choice(len(g.faces), LIGHTS, p=areas / areas.sum())
     position = (corners[faces] * rng.dirichlet(np.ones(3), LIGHTS)[..., None]).sum(axis=1)
     normal = g.face_normals[faces] * rng.choice([-1, 1], LIGHTS)[:, None]
-    return vpl_records(off_surface(scene, position, normal), normal, ONES, fov=fov)
+    return vpl_records(lift_off_surface(scene, position, normal), normal, ONES, fov=fov)
 
 
 @pytest.fixture(params=["perspective", "paraboloid"])

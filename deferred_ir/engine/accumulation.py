@@ -1,4 +1,4 @@
-"""The mean of many frames with fresh samples: progressive rendering, for any graph.
+"""Average many frames with fresh samples: progressive rendering, for any graph.
 
 What the graph calls `radiance` is averaged in 64 bits, put back in its place, and the passes that read it run on that
 mean: so display pixels come from the graph's own tone map, of the mean, not from a mean of display pixels.
@@ -54,7 +54,7 @@ class FrameSource(Protocol):
 class Accumulation:
     """Draws frames of `scene` at `time`, one by one, and averages them; frame k of seed s has frame_seed(s, k).
 
-    plan: one with the output radiance; all else that it makes images of must be made of that. measurement: gets one
+    plan: has the output radiance; all other images must be made of it. measurement: gets one
     frame for each image, its time all that was drawn for it, and the counters of each frame drawn. Raises GraphError
     where the plan does not fit.
     """

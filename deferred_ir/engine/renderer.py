@@ -1,4 +1,4 @@
-"""The way in: a Renderer holds one OpenGL context, one graph and the last scene it drew."""
+"""The entry point of the library: a Renderer holds one OpenGL context, one graph and the last scene it drew."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Renderer:
 
     size: (width, height) in pixels. graph: a built-in name or a graph file. device: see `deferred-ir devices`.
     set: parameters of passes, {"pass.param": value}. passes: pass classes of your own, {type name: class}, which a
-    graph file then names. reuse: a pass runs only if something has changed that its outputs are made of; else every
+    graph file then names. reuse: a pass is skipped while its inputs are unchanged; else every
     frame redoes everything. keep_all: leave nothing out that this scene or view does not need; the pixels are the same.
     window: its context, which is current, instead of a headless one on `device`.
 
@@ -154,7 +154,7 @@ class Renderer:
         measurement: Measurement | None = None,
         steps: Container[str] | None = None,
     ) -> None:
-        """Draw one frame and wait for it; what it took is added to `measurement`. steps: those to run, None for all."""
+        """Draw one frame, wait for it and add its times to `measurement`. steps: names of steps to run, None: all."""
         if not isinstance(seed, Integral) or seed < 0:
             raise SettingError(f"seed {seed!r}: wants a whole number of 0 or more")
         if self._closed:
@@ -180,7 +180,7 @@ class Renderer:
                 measurement.skipped.append(self.executor.skipped)
 
     def reset(self) -> None:
-        """Drop what is kept from frame to frame: the next one starts afresh, and runs every pass."""
+        """Forget all state between frames: the next frame starts afresh and runs every pass."""
         self.executor.forget()
 
     def finish(self, measurement: Measurement) -> None:
@@ -217,11 +217,11 @@ class Renderer:
 
     @property
     def embree_seconds(self) -> float:
-        """Time spent inside Embree since the scene was loaded."""
+        """Seconds spent inside Embree since the scene was loaded."""
         return self._tracer.seconds if self._tracer else 0.0
 
     def _upload(self, scene: Scene) -> None:
-        """Put the scene on the device unless it is there; the same surfaces may come with a new camera or light.
+        """Upload the scene unless it is on the device; the same surfaces may come with a new camera or light.
 
         Moving models may be elsewhere, too: then the surfaces are those of one `rest`.
         """
@@ -232,7 +232,7 @@ class Renderer:
         self._scene = scene
 
     def tracer(self) -> Tracer:
-        """Embree over the scene drawn last, in the coordinates of `recentre`, built when first asked for."""
+        """Return Embree over the scene drawn last, in the coordinates of `recentre`, built when first asked for."""
         assert self._scene, "no scene was drawn yet"
         if self._tracer is None:
             self._tracer = Tracer(self._scene)
@@ -247,7 +247,7 @@ class Renderer:
         self._buffers = self._tracer = self._scene = None
 
     def close(self) -> None:
-        """Give the context and all in it back; a second time does nothing."""
+        """Release the context and all in it; a second call does nothing."""
         if self._closed:
             return
         self._closed = True

@@ -1,4 +1,4 @@
-"""Graph files: TOML to a Graph, with `extends`, and `--set` on top. Files never import code.
+"""Read graph files: TOML to a Graph, with `extends`, and `--set` on top. Files never import code.
 
 A pass's type is the name of its module in `passes/`, or of a class that the caller hands over.
 """
@@ -30,7 +30,7 @@ RESERVED = ("type", "inputs")
 
 
 def graph_names() -> list[str]:
-    """The graphs that can be named without a path."""
+    """Return the names of the built-in graphs."""
     return sorted(path.stem for path in _graphs_folder().glob("*.toml"))
 
 
@@ -39,7 +39,7 @@ def load_graph(
     settings: Mapping[str, Any] | None = None,
     passes: Mapping[str, type[Pass]] | None = None,
 ) -> Graph:
-    """The graph `name` (a built-in name or a path), with `settings` {"pass.param": value} laid over it.
+    """Load the graph `name` (a built-in name or a path), with `settings` {"pass.param": value} laid over it.
 
     `passes` are the caller's own pass classes by type name. Raises one GraphError that lists all faults of the file.
     """
@@ -57,8 +57,8 @@ def load_graph(
         faults.append('outputs: none; add a table [outputs] with radiance = "pass.port"')
     faults += [f"{key}: no such key{did_you_mean(key, KEYS)}" for key in table if key not in KEYS]
     if faults:
-        told = " ".join("; ".join(faults).split())  # a key may hold a line break
-        raise GraphError(f"{path.name}: {told}")
+        text = " ".join("; ".join(faults).split())  # a key may hold a line break
+        raise GraphError(f"{path.name}: {text}")
     return Graph(nodes, outputs, path.name)
 
 
@@ -66,7 +66,7 @@ KEYS = ("extends", "outputs", "passes")
 
 
 def graph_files(name: str | Path) -> list[Path]:
-    """The file of the graph `name` and those that it extends; up to the first that cannot be read."""
+    """Return the file of the graph `name` and the files that it extends, up to the first that cannot be read."""
     found: list[Path] = []
     try:
         path: Path | None = _find(str(name), None)
@@ -80,7 +80,7 @@ def graph_files(name: str | Path) -> list[Path]:
 
 
 def graph_hash(graph: Graph) -> str:
-    """First 16 hex digits of SHA-256 over the wiring and all parameters."""
+    """Return the first 16 hex digits of SHA-256 over the wiring and all parameters."""
     nodes = {n.name: [type(n.work).__name__, repr(n.work.params), dict(n.inputs)] for n in graph.nodes.values()}
     text = json.dumps([nodes, dict(graph.outputs)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -95,7 +95,7 @@ def list_figures(graph: Graph) -> list[Figure]:
 
 @cache
 def pass_types() -> tuple[str, ...]:
-    """Names of the passes that come with the package."""
+    """Return the names of the passes that come with the package."""
     names = sorted(m.name for m in pkgutil.iter_modules(importlib.import_module(PASSES).__path__) if not m.ispkg)
     return tuple(names)
 
@@ -105,7 +105,7 @@ def _graphs_folder() -> Path:
 
 
 def _find(name: str, beside: Path | None) -> Path:
-    """A built-in graph by name, else a path (relative to the file that extends it)."""
+    """Find a built-in graph by name, else a file (relative to the file that extends it)."""
     if name in graph_names():
         return _graphs_folder() / f"{name}.toml"
     path = Path(name) if beside is None else beside / name
@@ -117,7 +117,7 @@ def _find(name: str, beside: Path | None) -> Path:
 
 
 def _read(path: Path, above: tuple[Path, ...], passes: Mapping[str, type[Pass]]) -> dict[str, Any]:
-    """The file's tables over those of the file that it extends."""
+    """Read the file and lay its tables over those of the file that it extends."""
     if path.resolve() in above:
         raise GraphError(
             f"{path.name}: extends itself; remove 'extends' from one of: {', '.join(p.name for p in above)}"
@@ -143,7 +143,7 @@ def _read(path: Path, above: tuple[Path, ...], passes: Mapping[str, type[Pass]])
 def _with_new_names(
     path: Path, table: dict[str, Any], base: Mapping[str, Any], passes: Mapping[str, type[Pass]]
 ) -> dict[str, Any]:
-    """`table`, to be laid over `base`, with parameters that have moved to other passes set there."""
+    """Return `table`, to be laid over `base`, with parameters that have moved to other passes set there."""
     own = {name: entry for name, entry in table.get("passes", {}).items() if isinstance(entry, dict)}
     values = {(name, key): value for name, entry in own.items() for key, value in entry.items() if key not in RESERVED}
     faults: list[str] = []
@@ -160,13 +160,13 @@ def _with_new_names(
 
 
 def _kinds(tables: Mapping[str, Any]) -> dict[str, str]:
-    """The type of pass of each node whose table names one that can be."""
+    """Return the type of pass of each node whose table names a possible one."""
     kinds = {name: entry.get("type", name) for name, entry in tables.items() if isinstance(entry, dict)}
     return {name: kind for name, kind in kinds.items() if isinstance(kind, str)}
 
 
 def _overlay(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
-    """`top` over `base`, table by table."""
+    """Lay `top` over `base`, table by table. Returns a new table."""
     result = copy.deepcopy(base)
     for key, value in top.items():
         both = isinstance(value, dict) and isinstance(result.get(key), dict)
@@ -175,7 +175,7 @@ def _overlay(base: dict[str, Any], top: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _cut(table: dict[str, Any]) -> dict[str, Any]:
-    """`table` without the inputs and outputs that an extending file has set to false."""
+    """Remove the inputs and outputs that an extending file has set to false. Returns `table`."""
     wirings = [table.get("outputs")]
     wirings += [entry.get("inputs") for entry in table.get("passes", {}).values() if isinstance(entry, dict)]
     for wires in wirings:
@@ -207,7 +207,7 @@ def _apply(
 
 
 def _pass(kind: str, passes: Mapping[str, type[Pass]]) -> type[Pass] | None:
-    """The class of passes of type `kind`, the caller's own first; None if there is none."""
+    """Return the class of passes of type `kind`, the caller's own first, or None."""
     if kind in passes:
         return passes[kind]
     if kind not in pass_types():

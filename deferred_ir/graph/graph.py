@@ -25,7 +25,7 @@ class Node:
 
 @dataclass(frozen=True)
 class Graph:
-    """Nodes by name, and the outputs that a caller can ask for, each a source `pass.port`. `origin`: its file."""
+    """Nodes by name, and the outputs that a caller can ask for, each a source `pass.port`. origin: the graph's file."""
 
     nodes: Mapping[str, Node]
     outputs: Mapping[str, str]

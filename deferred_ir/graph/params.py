@@ -40,7 +40,7 @@ class NoParams:
 
 @dataclass(frozen=True)
 class Spec:
-    """One parameter as data: what may stand in a file, a slider or a table of the docs."""
+    """One parameter as data, for files, sliders and the tables of the docs."""
 
     name: str
     default: Any
@@ -51,7 +51,7 @@ class Spec:
     hi: float | None
 
     def wants(self) -> str:
-        """What a value must be, in words."""
+        """Return in words what a value must be."""
         if self.number is bool:
             return "true or false"
         words = ["'" + "', '".join(self.choices) + "'"] if self.choices else []
@@ -63,7 +63,7 @@ class Spec:
         return " or ".join(words)
 
     def fault(self, value: Any) -> str | None:
-        """What is wrong with `value`, or None."""
+        """Return what is wrong with `value`, or None."""
         if self._fits(value):
             return None
         hint = did_you_mean(value, self.choices) if isinstance(value, str) and not self.number else ""
@@ -85,7 +85,7 @@ class Spec:
 
 
 def specs(params: type) -> dict[str, Spec]:
-    """All parameters of a parameter dataclass, by name."""
+    """Return all parameters of a parameter dataclass, by name."""
     hints = get_type_hints(params)
     result = {}
     for f in fields(params):
@@ -101,7 +101,7 @@ def specs(params: type) -> dict[str, Spec]:
 
 
 def parse(params: type, table: Mapping[str, Any], where: str, faults: list[str]) -> Any:
-    """An instance of the dataclass `params` from `table`; every fault is added to `faults` and its default kept."""
+    """Make an instance of the dataclass `params` from `table`; a fault goes to `faults`, its default stays."""
     known, values = specs(params), {}
     for name, value in table.items():
         if name not in known:
@@ -114,7 +114,7 @@ def parse(params: type, table: Mapping[str, Any], where: str, faults: list[str])
 
 
 def read_value(text: str) -> Any:
-    """The value of `--set pass.param=text`: a TOML value, else the bare text as a string."""
+    """Read the value of `--set pass.param=text`: a TOML value, else the bare text as a string."""
     try:
         table = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):  # no TOML, or too long or too deeply nested for Python

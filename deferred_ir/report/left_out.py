@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from deferred_ir.engine.renderer import Renderer
 
 TURNS = 3
-"""Times that passes which were left out are run, to measure them."""
+"""How often each pass that was left out is run to measure it."""
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """ms: of a frame's GPU time, median; bytes: on the device; None where it is not measured."""
+    """What was left out, and why. ms: median GPU time of a frame; bytes: on the device; None: not measured."""
 
     what: str
     why: str
@@ -63,10 +63,10 @@ def list_for_frames(renderer: Renderer, plan: Plan, measurement: Measurement) ->
             described = output.description
             if not isinstance(described, Texture) or not described.grows:
                 continue
-            made = executor.resource((step.name, port))
-            if made.layers < described.layers:
-                why = f"{made.layers} of {described.layers} layers are enough for the lights that live"
-                spared = made.nbytes // made.layers * (described.layers - made.layers)
+            texture = executor.resource((step.name, port))
+            if texture.layers < described.layers:
+                why = f"{texture.layers} of {described.layers} layers are enough for the lights that live"
+                spared = texture.nbytes // texture.layers * (described.layers - texture.layers)
                 found.append(LeftOut(f"{step.name}.{port}", why, bytes=spared))
     nbytes = executor.allocation.nbytes()
     for source, home in executor.allocation.aliases.items():

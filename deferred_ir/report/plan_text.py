@@ -1,4 +1,4 @@
-"""A plan for people: what runs, in what order, what was left out and why; as text and as a graph for Graphviz."""
+"""Write a plan for people: what runs, in what order, what was left out and why; as text or for Graphviz."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from deferred_ir.scene.scene import Scene
 
 
 def summary(plan: Plan, scene: Scene | None = None) -> str:
-    """One block a step: what it reads, what it writes and how long that lives; then what was left out.
+    """Describe each step: what it reads, what it writes and how long that lives; then what was left out.
 
     scene: whose frames the plan is for, to tell what its shaders do without.
     """
@@ -36,7 +36,7 @@ def _kind(work: object, name: str) -> str:
 
 
 def _subpasses(plan: Plan, number: int) -> list[str]:
-    """The sub-passes of a step; more than a handful are told by their first and last."""
+    """Describe the sub-passes of a step; of more than six only the first three and the last."""
     step = plan.steps[number]
     parts = [", ".join(f"{k} {v}" for k, v in part.items()) for part in step.work.subpasses(step.descriptions)]
     if len(parts) > 6:
@@ -45,7 +45,7 @@ def _subpasses(plan: Plan, number: int) -> list[str]:
 
 
 def dot(graph: Graph, plan: Plan) -> str:
-    """Graphviz source; what was left out is grey and says why."""
+    """Return the graph as Graphviz source; what was left out is grey and says why."""
     lines = ["digraph plan {", "  rankdir=LR;", '  node [shape=box, fontname="sans-serif"];']
     for name in graph.nodes:
         why = plan.left_out.get(name)

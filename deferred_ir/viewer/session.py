@@ -156,18 +156,16 @@ class Session:
 
     def _configure(self, graph: str, settings: dict[str, Any], scene: Scene) -> None:
         """Plan with another graph or other settings. Raises Error, and changes nothing then."""
-        before = self.graph, self.settings, self.plan
-        setup = self.renderer.setup
+        before = self.graph, self.settings, self.plan, self.renderer.setup
 
         def restore() -> None:
-            self.renderer.setup = setup
-            self.graph, self.settings, self.plan = before
+            self.graph, self.settings, self.plan, self.renderer.setup = before
 
         self.renderer.configure(graph=graph, set=settings)
         try:
             self.plan = self._make_plan(scene)
         except Error:
-            self.renderer.setup = setup
+            restore()
             raise
         self.graph, self.settings, self.error, self._undo = graph, settings, "", restore
 

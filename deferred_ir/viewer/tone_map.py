@@ -10,7 +10,7 @@ import numpy as np
 from deferred_ir.engine.accumulation import find_readers
 from deferred_ir.graph.graph import Plan, Step
 from deferred_ir.graph.roles import find_parameter
-from deferred_ir.output.exposure import automatic_stops
+from deferred_ir.output.exposure import compute_stops
 from deferred_ir.viewer.session import Session
 
 
@@ -18,7 +18,7 @@ def find_exposure(session: Session) -> float | None:
     """Return the exposure of the picture on screen in stops; None if it is a setting, not automatic."""
     if not any(map(_find_automatic, session.plan.steps)):
         return None
-    return automatic_stops(session.image().radiance)
+    return compute_stops(session.image().radiance)
 
 
 def tone_map(session: Session, radiance: Any, stops: float | None) -> np.ndarray:

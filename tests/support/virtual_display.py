@@ -1,4 +1,4 @@
-"""A virtual display with real key and mouse events, and what tests of the viewer ask it for."""
+"""A virtual display with real key and mouse events, and helpers of the tests of the viewer."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ PATIENCE = 20.0
 
 @cache
 def cornell() -> Scene:
-    """The Cornell box, which most tests are about, read once."""
+    """Load the Cornell box, which most tests use, once."""
     return load("cornell")
 
 
 @contextmanager
 def display() -> Iterator[str]:
-    """Runs Xvfb and makes it this process's display; its name."""
+    """Run Xvfb and make it this process's display. Yields its name."""
     read, write = os.pipe()
     server = subprocess.Popen(
         ["Xvfb", "-displayfd", str(write), "-screen", "0", SCREEN, "-nolisten", "tcp"],
@@ -55,7 +55,7 @@ def display() -> Iterator[str]:
 
 
 def xdo(*words: object) -> None:
-    """One command of xdotool."""
+    """Run one command of xdotool."""
     subprocess.run(["xdotool", *map(str, words)], check=True)
 
 
@@ -72,7 +72,7 @@ def act(viewer: Viewer, *words: object, frames: int = 4) -> None:
 
 
 def picture(viewer: Viewer) -> Any:
-    """The part of the window in which the picture is."""
+    """Read the part of the window that the picture fills, uint8 (H, W, 3)."""
     area = viewer.area()
     return viewer.screenshot()[:, : area.width]
 
@@ -81,7 +81,7 @@ _shared: list[Renderer] = []
 
 
 def rendered(scene: Scene, size: tuple[int, int] = SIZE, graph: str = "deferred", **options: Any) -> Any:
-    """Display pixels without a window; set: {"pass.param": value}, time: seconds, accumulate: frames."""
+    """Render display pixels without a window; set: {"pass.param": value}, time: seconds, accumulate: frames."""
     if not _shared:
         _shared.append(Renderer(size, graph, device="software"))
     _shared[0].configure(size=size, graph=graph, set=options.pop("set", {}))
@@ -96,13 +96,13 @@ def close_renderer() -> None:
 
 
 def frames(viewer: Viewer, count: int = 4) -> None:
-    """Some frames without input."""
+    """Draw some frames without input."""
     for _ in range(count):
         viewer.frame()
 
 
 def restore(viewer: Viewer) -> None:
-    """The window as it was at first: the Cornell box, seen and lit as its file says, and nothing else chosen."""
+    """Bring the window back to the Cornell box, seen and lit as its file says, and undo all choices."""
     session, panel = viewer.session, viewer.panel
     if session.scene is not cornell():
         session.use(cornell())
@@ -160,13 +160,13 @@ class Spy:
 
 
 def arrange(viewer: Viewer, *opened: str) -> None:
-    """Open these parts of the panel and no others, at first Scene, Light and Passes."""
+    """Open these parts of the panel and no others; by default Scene, Light and Passes."""
     with Spy(viewer.panel, opened or ("Scene", "Light", "Passes")):
         frames(viewer, 2)
 
 
 def middle(viewer: Viewer, owner: Any, label: str, inside: int = 100) -> tuple[int, int]:
-    """A point of the widget of `owner` whose label begins so: `inside` pixels from its left, at half its height."""
+    """Return a point of the widget of `owner` with this label: `inside` pixels from its left, at half its height."""
     with Spy(owner) as spy:
         viewer.frame()
     x0, y0, _, y1 = next(place for name, place in spy.places.items() if name.startswith(label))

@@ -54,7 +54,7 @@ class Client:
         self._x.XSync(self._display, 0)
 
     def _receive(self, kind: int, pump: Callable[[], object]) -> Any:
-        """The next event of this kind; `pump` lets the other side work."""
+        """Wait for the next event of this kind; `pump` lets the other side work."""
         event, end = Event(), time.monotonic() + PATIENCE
         while time.monotonic() < end:
             pump()
@@ -65,7 +65,7 @@ class Client:
         raise AssertionError(f"no event {kind} came")
 
     def _change(self, window: int, name: int, kind: int, data: bytes | Any) -> None:
-        """Give a property bytes, or numbers, which have 32 bits in the protocol and are longs here."""
+        """Set a property to bytes, or to numbers, which have 32 bits in the protocol and are longs here."""
         words = ctypes.c_ulong(window), ctypes.c_ulong(name), ctypes.c_ulong(kind)
         bits = 8 if isinstance(data, bytes) else 32
         self._x.XChangeProperty(self._display, *words, bits, 0, data, len(data))
@@ -89,13 +89,13 @@ class Client:
         assert finished[5] == self._atom("XdndFinished")
 
     def minimise(self, window: int) -> None:
-        """What a window manager does to it."""
+        """Minimise a window as a window manager does."""
         self._state(window, ICONIC)
         self._x.XUnmapWindow(self._display, ctypes.c_ulong(window))
         self._x.XSync(self._display, 0)
 
     def restore(self, window: int) -> None:
-        """And back."""
+        """Bring a minimised window back."""
         self._state(window, NORMAL)
         self._x.XMapWindow(self._display, ctypes.c_ulong(window))
         self._x.XSync(self._display, 0)

@@ -1,4 +1,4 @@
-"""Light, parameters, passes, reference and saving in the viewer, in a real window."""
+"""Light, parameters, passes and files that change on disk, in a real window."""
 
 from __future__ import annotations
 
@@ -7,16 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PIL import Image
-from virtual_display import FEW, SIZE, Spy, act, cornell, frames, middle, picture, rendered, xdo
+from virtual_display import FEW, SIZE, act, cornell, frames, middle, picture, rendered, xdo
 
-from deferred_ir.cli import main
-from deferred_ir.loading.load import load
-from deferred_ir.output.exposure import automatic_stops
-from deferred_ir.viewer import saving
 from deferred_ir.viewer.panels import light_axes
-from deferred_ir.viewer.panels import side_panel as panels
-from deferred_ir.viewer.tone_map import tone_map
 
 
 def test_a_parameter_rebuilds_nothing_and_runs_only_what_reads_it(viewer):
@@ -167,128 +160,6 @@ def test_space_averages_frames_and_a_move_starts_again(viewer):
     viewer.session.look(replace(viewer.session.camera, fov=50.0))
     viewer.frame()
     assert viewer.session.accumulation is None
-
-
-def test_the_reference_is_split_into_the_picture_and_measured(viewer):
-    panel = viewer.panel.reference
-    panel._spp, panel.at = 0, 0.5
-    before = picture(viewer)
-    panel.start()
-    while panel.job.running:
-        viewer.frame(0.02)
-    frames(viewer, 2)
-    assert panel.job.error == ""
-    half = SIZE[0] // 2
-    assert np.array_equal(picture(viewer)[:, :half], before[:, :half])
-    result, stops = panel.job.result, automatic_stops(viewer.session.image().radiance)
-    assert np.array_equal(picture(viewer)[:, half:], tone_map(viewer.session, result.radiance, stops)[::-1, half:, :3])
-    with Spy(viewer.panel) as spy:
-        viewer.frame()
-    assert any(word.startswith("relMSE 0.") for _, word in spy.calls), "in the status line, whatever is open"
-    viewer.session.look(replace(viewer.session.camera, fov=50.0))
-    frames(viewer, 2)
-    assert not panel._matches
-
-
-def test_both_sides_of_the_split_have_the_exposure_of_the_picture(viewer):
-    """A reference four times as bright is shown two stops brighter, though the exposure is automatic."""
-    panel, session = viewer.panel.reference, viewer.session
-    panel._spp = 0
-    panel.start()
-    while panel.job.running:
-        viewer.frame(0.02)
-    radiance = session.image().radiance
-    panel.job.result = replace(panel.job.result, radiance=4 * radiance)
-    frames(viewer, 2)
-    half, stops = SIZE[0] // 2, automatic_stops(radiance)
-    expected = rendered(cornell(), set={**FEW, "tonemap.exposure": stops + 2})
-    assert np.array_equal(picture(viewer)[:, half:], expected[:, half:])
-    same = rendered(cornell(), set={**FEW, "tonemap.exposure": stops}).astype(int)
-    assert np.abs(picture(viewer)[:, :half] - same[:, :half]).max() <= 1
-    session.adjust("vpl.count", 4)
-    frames(viewer, 2)
-    stops = automatic_stops(session.image().radiance)
-    expected = rendered(cornell(), set={"vpl.count": 8, "tonemap.exposure": automatic_stops(radiance)})
-    assert np.array_equal(picture(viewer)[:, half:], tone_map(session, 4 * radiance, stops)[::-1, half:, :3])
-
-
-def test_a_trace_can_be_given_up(viewer):
-    panel = viewer.panel.reference
-    panel._spp = 3
-    panel.start()
-    viewer.frame()
-    panel.job.stop()
-    assert not panel.job.running
-    assert panel.job.result is None
-    panel._spp = 1
-
-
-def until_at_rest(viewer):
-    """Draw frames until nothing changes any more, not even VPLs that are renewed over many frames."""
-    assert any(not viewer.frame() for _ in range(100))
-
-
-@pytest.mark.parametrize("graph", ["deferred", "incremental"])
-def test_what_is_on_screen_is_saved(viewer, tmp_path, monkeypatch, graph):
-    """Also where VPLs are renewed over many frames: a first frame has other pixels, and few VPLs."""
-    monkeypatch.setattr(panels, "FOLDER", tmp_path)
-    viewer.session.choose(graph)
-    viewer.session.adjust("vpl.count", 32)
-    viewer.session.adjust("tonemap.exposure", 0.75)
-    for step in (0.1, 0.2):
-        viewer.session.shine(replace(cornell().spotlight, position=(step, 0.9, -0.3)))
-        viewer.session.look(replace(cornell().camera, position=(step, 0.273, -0.8)))
-        frames(viewer, 4)
-    until_at_rest(viewer)
-    before = picture(viewer)
-    act(viewer, "key", "ctrl+s")
-    assert viewer.session.error == ""
-    assert viewer.panel.saved.startswith("saved "), viewer.panel.saved
-    assert np.array_equal(picture(viewer), before), "saving changes nothing on screen"
-    with Image.open(tmp_path / "cornell-1.png") as saved:
-        assert np.array_equal(np.asarray(saved), before)
-    assert (tmp_path / "cornell-1.exr").exists()
-    again = ["render", str(tmp_path / "cornell-1.toml"), "--device", "software", "-o", str(tmp_path / "again.png")]
-    assert main.main(again) == 0
-    with Image.open(tmp_path / "again.png") as again:
-        assert np.array_equal(np.asarray(again), before) == (graph == "deferred")
-    comment = (tmp_path / "cornell-1.toml").read_text().partition("name = ")[0]
-    assert ("earlier frames left" in comment) == (graph == "incremental")
-
-
-def test_a_second_picture_gets_a_name_of_its_own(viewer, tmp_path, monkeypatch):
-    monkeypatch.setattr(panels, "FOLDER", tmp_path)
-    act(viewer, "key", "ctrl+s")
-    act(viewer, "key", "ctrl+s")
-    assert sorted(path.name for path in tmp_path.glob("*.toml")) == ["cornell-1.toml", "cornell-2.toml"]
-
-
-def test_a_name_with_brackets_is_not_written_over(tmp_path):
-    """To a search for files they are a pattern."""
-    (tmp_path / "hall[2]-1.png").touch()
-    assert saving._find_free_stem(tmp_path, "hall[2]") == "hall[2]-2"
-
-
-def test_a_recorded_way_is_saved_and_plays(viewer, tmp_path, monkeypatch):
-    from deferred_ir.viewer import recording as path
-
-    monkeypatch.setattr(panels, "FOLDER", tmp_path)
-    monkeypatch.setattr(path, "PERIOD", 0.0)
-    session = viewer.session
-    start = session.spotlight
-    session.switch_recording(True)
-    viewer.frame()
-    act(viewer, "keydown", "Right")
-    act(viewer, "keyup", "Right")
-    session.switch_recording(False)
-    act(viewer, "key", "ctrl+s")
-    saved = load(tmp_path / "cornell-1.toml")
-    assert saved.spotlight.motion == session.scene.spotlight.motion is not None
-    assert saved.camera.motion is None
-    assert session.spotlight == start
-    session.playing = True
-    frames(viewer, 3)
-    assert session.spotlight != start
 
 
 def test_shaders_and_graphs_are_read_again_and_a_broken_edit_keeps_the_picture(viewer, tmp_path, monkeypatch):

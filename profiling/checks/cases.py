@@ -1,4 +1,4 @@
-"""The stiff and extreme cases that `deferred-ir check` draws, as data. docs/stability.md says why the bounds are so."""
+"""The extreme cases of `deferred-ir check`, as data. docs/stability.md explains the bounds."""
 
 from __future__ import annotations
 
@@ -12,69 +12,71 @@ from deferred_ir.profiling.checks import change_views as change
 from deferred_ir.profiling.checks.extremes import HALF_FLOAT, Case
 
 ROUNDING = 2.0**-24
-"""Of a 32-bit float, relative."""
+"""Relative rounding error of a 32-bit float."""
 ROUNDED = 16 * ROUNDING
-"""Bound where a few factors are rounded otherwise."""
+"""Bound where a few factors are rounded differently."""
 TEXELS = 256
-"""Across a VPL's map, unless a case says otherwise."""
+"""Width of a VPL's map, unless a case sets another."""
 MOVED = 8 * TEXELS * ROUNDING
-"""Bound where coordinates are rounded otherwise: by so much of a texel edges move in maps."""
+"""Bound where coordinates are rounded differently: edges in maps move by this fraction of a texel."""
 NORMALS = 2.0**-14
-"""Bound where normals are rounded otherwise before they are stored in 16 bits."""
+"""Bound where normals are rounded differently before they are stored in 16 bits."""
 SAME, OTHER = 1.5, 4.0
-"""Slack where light and view stay, and where they do not."""
+"""Slack where light and view stay, and where they change."""
 
 
 def coarse(size: int, slack: float = SAME) -> float:
-    """Slack for maps of `size` texels: what they get wrong grows with a texel's width."""
+    """Return the slack for maps of `size` texels: their errors grow with a texel's width."""
     return slack * max(1.0, TEXELS / size)
 
 
 RANDOM = {"vpl.pattern": "random"}
-"""Takes any number of points as well as any other."""
+"""A pattern that suits every number of points."""
 SCALE = tuple(
-    Case(f"scale {factor:g}, E by its square", partial(change.scaled, factor=factor), "itself", bound=MOVED)
+    Case(f"scale {factor:g}, E by its square", partial(change.scale, factor=factor), "itself", bound=MOVED)
     for factor in (1e-4, 1e-2, 1e2, 1e4)
 )
 AWAY = tuple(
-    Case(f"{units:g} units from the origin", partial(change.shifted, by=(units, -units, units)), "itself", bound=MOVED)
+    Case(f"{units:g} units from the origin", partial(change.shift, by=(units, -units, units)), "itself", bound=MOVED)
     for units in (1e3, 1e5, 1e7)
 )
 CAMERA = (
     *(
-        Case(f"near/far 1e7, card {near:g} diagonals away", partial(shape.near_and_far, near=near), slack=OTHER)
+        Case(f"near/far 1e7, card {near:g} diagonals away", partial(shape.add_near_and_far, near=near), slack=OTHER)
         for near in (1e-3, 1e-5)
     ),
     *(
-        Case(f"camera {off:g} diagonals from a wall", partial(change.camera_at_a_wall, fraction=off), slack=OTHER)
+        Case(f"camera {off:g} diagonals from a wall", partial(change.put_camera_at_wall, fraction=off), slack=OTHER)
         for off in (1e-3, 1e-5, 1e-7)
     ),
     *(
         Case(
-            f"camera along a wall, {off:g} off", partial(change.camera_at_a_wall, fraction=off, along=True), slack=OTHER
+            f"camera along a wall, {off:g} off",
+            partial(change.put_camera_at_wall, fraction=off, along=True),
+            slack=OTHER,
         )
         for off in (1e-3, 1e-5)
     ),
-    Case("camera and light in a box 0.01 wide", partial(shape.all_in_a_box, half=0.005), slack=OTHER),
+    Case("camera and light in a box 0.01 wide", partial(shape.put_all_in_box, half=0.005), slack=OTHER),
     *(
-        Case(f"up {angle:g} rad from the view", partial(change.looking_along_up, angle=angle), "itself", bound=MOVED)
+        Case(f"up {angle:g} rad from the view", partial(change.tilt_up, angle=angle), "itself", bound=MOVED)
         for angle in (1e-2, 2e-6)
     ),
 )
 LIGHT = (
     *(
-        Case(f"light {off:g} diagonals from a wall", partial(change.light_at_a_wall, fraction=off), slack=OTHER)
+        Case(f"light {off:g} diagonals from a wall", partial(change.put_light_at_wall, fraction=off), slack=OTHER)
         for off in (1e-3, 1e-5, 1e-7, 0.0)
     ),
-    Case("light grazing a wall", partial(change.light_at_a_wall, fraction=1e-3, grazing=True), slack=OTHER),
-    Case("light in a corner", change.light_in_a_corner, slack=OTHER),
+    Case("light grazing a wall", partial(change.put_light_at_wall, fraction=1e-3, grazing=True), slack=OTHER),
+    Case("light in a corner", change.put_light_in_corner, slack=OTHER),
     *(
-        Case(f"light within a box {2 * half:g} wide", partial(shape.light_in_a_box, half=half), "black")
+        Case(f"light within a box {2 * half:g} wide", partial(shape.put_light_in_box, half=half), "black")
         for half in (0.005, 0.0005)
     ),
-    Case("camera where the light is", change.facing_each_other, slack=OTHER),
+    Case("camera where the light is", change.put_camera_at_light, slack=OTHER),
     *(
-        Case(f"E times {factor:g}", partial(change.brighter, factor=factor), "itself", bound=ROUNDED, gain=factor)
+        Case(f"E times {factor:g}", partial(change.brighten, factor=factor), "itself", bound=ROUNDED, gain=factor)
         for factor in (1e-20, 1e-10, 1e10, 1e20)
     ),
     Case("spotlight's fov 0.1: all VPLs in one spot", partial(change.with_light, fov=0.1), slack=OTHER),
@@ -96,41 +98,49 @@ LIGHT = (
     ),
 )
 TRIANGLES = (
-    Case("two walls closer than a texel", partial(shape.thin_walls, apart=1e-4), slack=SAME),
-    Case("slivers of 1e-6", partial(shape.split, share=1e-6), "itself", bound=MOVED),
-    Case("triangles that are points and lines", shape.degenerate, "itself", bound=ROUNDED),
-    Case("each face twice", shape.doubled, "itself", bound=ROUNDED),
-    Case("each face twice, once from behind", partial(shape.doubled, turned=True), "itself", bound=MOVED),
-    Case("each face and its parts, coplanar", partial(shape.split, share=0.3, whole=True), "itself", bound=MOVED),
+    Case("two walls closer than a texel", partial(shape.add_thin_walls, apart=1e-4), slack=SAME),
+    Case("slivers of 1e-6", partial(shape.split_faces, fraction=1e-6), "itself", bound=MOVED),
+    Case("triangles that are points and lines", shape.add_degenerate, "itself", bound=ROUNDED),
+    Case("each face twice", shape.double_faces, "itself", bound=ROUNDED),
+    Case("each face twice, once from behind", partial(shape.double_faces, turned=True), "itself", bound=MOVED),
+    Case(
+        "each face and its parts, coplanar", partial(shape.split_faces, fraction=0.3, whole=True), "itself", bound=MOVED
+    ),
     *(
-        Case(f"backdrop {times:g} diagonals away", partial(shape.with_backdrop, times=times), slack=OTHER)
+        Case(f"backdrop {times:g} diagonals away", partial(shape.add_backdrop, times=times), slack=OTHER)
         for times in (1e2, 1e3, 1e6)
     ),
     *(
-        Case(f"triangle {times:g} times larger, {name}", partial(shape.with_giant, times=times, tilt=tilt), slack=OTHER)
+        Case(
+            f"triangle {times:g} times larger, {name}",
+            partial(shape.add_large_triangle, times=times, tilt=tilt),
+            slack=OTHER,
+        )
         for times in (1e3, 1e6)
         for name, tilt in (("upright", 0.0), ("aslant", pi / 5))
     ),
 )
 SURFACES = (
-    Case("normals 0", partial(surface.with_normals, value=0.0), "itself", wanted=surface.faceted),
-    Case("normals NaN", partial(surface.with_normals, value=float("nan")), "itself", wanted=surface.faceted),
-    Case("normals against the faces", surface.against_the_faces, "itself", wanted=surface.faceted, bound=NORMALS),
+    Case("normals 0", partial(surface.with_normals, value=0.0), "itself", expected=surface.remove_normals),
+    Case("normals NaN", partial(surface.with_normals, value=float("nan")), "itself", expected=surface.remove_normals),
+    Case(
+        "normals against the faces", surface.reverse_normals, "itself", expected=surface.remove_normals, bound=NORMALS
+    ),
     *(
         Case(
             f"texture {side}x{side}",
-            partial(surface.papered, size=side),
+            partial(surface.texture_grey, size=side),
             "itself",
-            wanted=surface.painted,
+            expected=surface.paint_grey,
             bound=HALF_FLOAT,
         )
         for side in (1, 8192)
     ),
     Case(
         "texture coordinates 1e4",
-        partial(surface.checkered, shift=1e4),
+        partial(surface.texture_checkers, shift=1e4),
         "itself",
-        wanted=surface.checkered,
+        expected=surface.texture_checkers,
         bound=MOVED,
     ),
 )
@@ -144,15 +154,11 @@ SIZES = (
 )
 
 
-def _of(graph: str, *cases: Case) -> tuple[Case, ...]:
-    return tuple(replace(case, graph=graph) for case in cases)
-
-
 NAMED = {case.name: case for case in (*SCALE, *AWAY, *CAMERA, *LIGHT, *TRIANGLES, *SURFACES, *SIZES)}
 
 
-def _again(graph: str, *names: str) -> tuple[Case, ...]:
-    """Cases in another graph."""
+def _repeat(graph: str, *names: str) -> tuple[Case, ...]:
+    """Repeat cases with another graph."""
     return tuple(replace(NAMED[name], graph=graph) for name in names)
 
 
@@ -172,14 +178,14 @@ MAPS = (
 )
 TWICE = ("triangles that are points and lines", "each face twice")
 GRAPHS = (
-    *_again("forward", *LINEAR, BOX, *MAPS, *TWICE),
-    *_again("hemisphere", *LINEAR, BOX, *MAPS),
-    # Which triangles are split, and may bend less, goes by their neighbours in memory: not the same to the bit.
-    *(replace(case, against="rays", slack=SAME) for case in _again("hemisphere", *TWICE)),
-    *_again("interleaved", *LINEAR, BOX),
-    *_again("accurate", *LINEAR, BOX),
-    *_again("incremental", *LINEAR, BOX),
+    *_repeat("forward", *LINEAR, BOX, *MAPS, *TWICE),
+    *_repeat("hemisphere", *LINEAR, BOX, *MAPS),
+    # The choice of triangles to split depends on their neighbours in memory, so images are not the same to the bit.
+    *(replace(case, against="rays", slack=SAME) for case in _repeat("hemisphere", *TWICE)),
+    *_repeat("interleaved", *LINEAR, BOX),
+    *_repeat("accurate", *LINEAR, BOX),
+    *_repeat("incremental", *LINEAR, BOX),
 )
-"""Where it matters, again with plain maps, with paraboloid maps, and with what other graphs add."""
+"""Cases that matter for single maps, paraboloid maps and the passes of other graphs, repeated with those."""
 
 CASES = (Case("as it is", slack=1.0), *NAMED.values(), *GRAPHS)

@@ -1,4 +1,4 @@
-"""What the cases of stability_cases.py do to a scene's normals, colours and textures."""
+"""Changes of a scene's normals, colours and textures for the extreme cases. Each takes a scene, returns another."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from deferred_ir.profiling.checks.change_triangles import with_geometry
 from deferred_ir.scene.scene import Scene, Texture
 
 GREY = 188
-"""In sRGB; about half in linear light."""
+"""An sRGB value, about one half in linear light."""
 
 
 def with_albedo(scene: Scene, albedo: float) -> Scene:
-    """All surfaces of one reflectance, without textures and colours."""
+    """Give all surfaces one reflectance, without textures and colours."""
     materials = tuple(replace(material, albedo=(albedo,) * 3, texture=None) for material in scene.materials)
     return with_geometry(replace(scene, materials=materials, textures=()), colors=None, uvs=None)
 
 
-def _apart(scene: Scene, normals: Array | None) -> Scene:
-    """Faces that share no vertices, with shading normals (3 F, 3), corner by corner."""
+def _separate_faces(scene: Scene, normals: Array | None) -> Scene:
+    """Give each face vertices of its own. normals: shading normals of the corners, (3 F, 3), None for none."""
     g = scene.geometry
     corners = g.faces.ravel()
     return with_geometry(
@@ -35,35 +35,35 @@ def _apart(scene: Scene, normals: Array | None) -> Scene:
     )
 
 
-def faceted(scene: Scene) -> Scene:
-    """Without shading normals."""
-    return _apart(scene, None)
+def remove_normals(scene: Scene) -> Scene:
+    """Remove the shading normals."""
+    return _separate_faces(scene, None)
 
 
 def with_normals(scene: Scene, value: float) -> Scene:
-    """Shading normals of `value` in all places."""
-    return _apart(scene, np.full((scene.geometry.faces.size, 3), value))
+    """Set all components of the shading normals to `value`."""
+    return _separate_faces(scene, np.full((scene.geometry.faces.size, 3), value))
 
 
-def against_the_faces(scene: Scene) -> Scene:
-    """Shading normals that are the faces' own, the other way round."""
-    return _apart(scene, -np.repeat(scene.geometry.face_normals, 3, axis=0))
+def reverse_normals(scene: Scene) -> Scene:
+    """Set the shading normals to the reverse of the faces' normals."""
+    return _separate_faces(scene, -np.repeat(scene.geometry.face_normals, 3, axis=0))
 
 
-def painted(scene: Scene) -> Scene:
-    """All surfaces of the grey that `papered` has, without a texture."""
+def paint_grey(scene: Scene) -> Scene:
+    """Give all surfaces the grey of `texture_grey`, without a texture."""
     from deferred_ir.base.colour import srgb_table
 
     return with_albedo(scene, float(srgb_table()[GREY].astype(np.float16)))
 
 
-def papered(scene: Scene, size: int) -> Scene:
-    """All surfaces grey, by a texture of size x size texels."""
+def texture_grey(scene: Scene, size: int) -> Scene:
+    """Make all surfaces grey by a texture of size x size texels."""
     return _with_texture(scene, np.full((size, size, 3), GREY, np.uint8), 0.0)
 
 
-def checkered(scene: Scene, shift: float = 0.0) -> Scene:
-    """All surfaces with a texture of 8x8 random greys; coordinates begin at `shift`, as a file has them."""
+def texture_checkers(scene: Scene, shift: float = 0.0) -> Scene:
+    """Give all surfaces a texture of 8x8 random greys. shift: the coordinates, as in a file, start there."""
     greys = np.random.default_rng(3).integers(60, 250, (8, 8, 1))
     return _with_texture(scene, np.repeat(greys, 3, axis=2).astype(np.uint8), shift)
 

@@ -1,4 +1,4 @@
-"""What the cases of stability_cases.py do to a scene's units, camera and light."""
+"""Changes of a scene's units, camera and light for the extreme cases. Each takes a scene and returns another."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from deferred_ir.scene.scene import Scene
 
 
 def same(scene: Scene) -> Scene:
-    """No change."""
+    """Return the scene itself."""
     return scene
 
 
-def still(scene: Scene) -> Scene:
-    """As it is at 0 s, without motions: they know nothing of other units and triangles. Itself where nothing moves."""
+def freeze(scene: Scene) -> Scene:
+    """Freeze the scene at 0 s, since motions would not fit changed units. Returns the scene itself if nothing moves."""
     if not scene.moves:
         return scene
-    held = scene.at(0.0)
+    frozen = scene.at(0.0)
     geometry = replace(
-        scene.geometry, positions=held.geometry.positions, normals=held.geometry.normals, moving=(), medians=None
+        scene.geometry, positions=frozen.geometry.positions, normals=frozen.geometry.normals, moving=(), medians=None
     )
-    return replace(held, geometry=geometry, models=tuple(replace(model, motion=None) for model in scene.models))
+    return replace(frozen, geometry=geometry, models=tuple(replace(model, motion=None) for model in scene.models))
 
 
 def vec3(values: Any) -> Vec3:
-    """Three floats."""
+    """Convert to three floats."""
     x, y, z = (float(value) for value in values)
     return x, y, z
 
 
-def scaled(scene: Scene, factor: float) -> Scene:
-    """In other units, with E so that the picture stays."""
+def scale(scene: Scene, factor: float) -> Scene:
+    """Change the units, and E so that the image stays the same."""
     camera, light = scene.camera, scene.spotlight
 
     def point(place: Vec3) -> Vec3:
@@ -57,81 +57,81 @@ def scaled(scene: Scene, factor: float) -> Scene:
     )
 
 
-def shifted(scene: Scene, by: Vec3) -> Scene:
-    """Elsewhere, all of it."""
+def shift(scene: Scene, by: Vec3) -> Scene:
+    """Translate the whole scene."""
     geometry = replace(scene.geometry, positions=scene.geometry.positions + by)
     return replace(
         scene, geometry=geometry, camera=translate_view(scene.camera, by), spotlight=translate_view(scene.spotlight, by)
     )
 
 
-def brighter(scene: Scene, factor: float) -> Scene:
-    """With E times `factor`."""
+def brighten(scene: Scene, factor: float) -> Scene:
+    """Multiply E by `factor`."""
     return with_light(scene, emission=vec3(np.multiply(scene.spotlight.emission, factor)))
 
 
 def with_light(scene: Scene, **keys: Any) -> Scene:
-    """With other values of the spotlight."""
+    """Change values of the spotlight."""
     return replace(scene, spotlight=replace(scene.spotlight, **keys))
 
 
-def looking_along_up(scene: Scene, angle: float) -> Scene:
-    """The camera's up vector at `angle` (radians) to its view, and so that it stands as before."""
+def tilt_up(scene: Scene, angle: float) -> Scene:
+    """Turn the camera's up vector to `angle` (radians) from its view direction; the image stays the same."""
     _, up, forward = scene.camera.axes
     tilted = np.cos(angle) * forward + np.sin(angle) * up
     return replace(scene, camera=replace(scene.camera, up=vec3(tilted)))
 
 
-def wall(scene: Scene, place: Vec3, towards: Array) -> tuple[Array, Array]:
-    """Where a ray first lands, and the normal there, towards it; the place itself where it lands nowhere."""
+def find_wall(scene: Scene, place: Vec3, towards: Array) -> tuple[Array, Array]:
+    """Return a ray's first hit and the normal there, facing the ray; the origin and -towards if it hits nothing."""
     hits = Tracer(recentre(scene)).closest(np.subtract(place, scene.geometry.centre)[None], towards[None])
     if not hits.hit[0]:
         return np.asarray(place), -towards
     return hits.position[0] + scene.geometry.centre, hits.normal[0]
 
 
-def across(normal: Array) -> Vec3:
-    """A unit vector at right angles to another."""
+def perpendicular(normal: Array) -> Vec3:
+    """Return a unit vector perpendicular to another."""
     other = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.9 else np.array([1.0, 0.0, 0.0])
     crossed = np.cross(normal, other)
     return vec3(crossed / np.linalg.norm(crossed))
 
 
-def camera_at_a_wall(scene: Scene, fraction: float, along: bool = False) -> Scene:
-    """The camera in front of what it looks at, so many diagonals off, and turned round, or looking along it."""
-    at, normal = wall(scene, scene.camera.position, scene.camera.axes[2])
-    place, right = at + normal * fraction * scene.geometry.diagonal, np.array(across(normal))
+def put_camera_at_wall(scene: Scene, fraction: float, along: bool = False) -> Scene:
+    """Put the camera `fraction` diagonals off the surface it looks at, turned round or, with `along`, along it."""
+    at, normal = find_wall(scene, scene.camera.position, scene.camera.axes[2])
+    place, right = at + normal * fraction * scene.geometry.diagonal, np.array(perpendicular(normal))
     aim, up = (right, vec3(normal)) if along else (normal, vec3(right))
     return replace(scene, camera=Camera(vec3(place), vec3(place + aim * scene.geometry.diagonal), up, 75.0))
 
 
-def light_at_a_wall(scene: Scene, fraction: float, grazing: bool = False) -> Scene:
-    """The light at what it lit, so many diagonals off, shining back, or along the wall."""
+def put_light_at_wall(scene: Scene, fraction: float, grazing: bool = False) -> Scene:
+    """Put the light `fraction` diagonals off the surface it lit, shining away from it or, with `grazing`, along it."""
     light = scene.spotlight
-    at, normal = wall(scene, light.position, light.axis)
+    at, normal = find_wall(scene, light.position, light.axis)
     place = at + normal * fraction * scene.geometry.diagonal
-    aim = np.array(across(normal)) + 0.01 * normal if grazing else normal
+    aim = np.array(perpendicular(normal)) + 0.01 * normal if grazing else normal
     return with_light(scene, position=vec3(place), look_at=vec3(place + aim * scene.geometry.diagonal))
 
 
-def light_in_a_corner(scene: Scene) -> Scene:
-    """The light a thousandth of the way from a corner to the middle of what lies about the camera, shining there."""
+def put_light_in_corner(scene: Scene) -> Scene:
+    """Put the light a thousandth of the diagonal off the walls of a corner, shining at the camera's place."""
     camera = scene.camera
     directions = np.array([camera.axes.T @ np.array(way) for way in ((1.0, 1.0, 1.0), (-1.0, 1.0, 1.0))])
     middle = np.asarray(camera.position)
     corner = middle
     for direction in directions:
-        at, normal = wall(scene, vec3(corner), direction / np.linalg.norm(direction))
+        at, normal = find_wall(scene, vec3(corner), direction / np.linalg.norm(direction))
         corner = at + normal * 1e-3 * scene.geometry.diagonal
-    # From there along the wall to the next, so that two are a thousandth of the diagonal away.
-    at, normal = wall(scene, vec3(corner), np.asarray(across(normal)))
+    # From there along the wall to the next wall, so that both are a thousandth of the diagonal away.
+    at, normal = find_wall(scene, vec3(corner), np.asarray(perpendicular(normal)))
     corner = at + normal * 1e-3 * scene.geometry.diagonal
     return with_light(scene, position=vec3(corner), look_at=vec3(middle))
 
 
-def facing_each_other(scene: Scene) -> Scene:
-    """The camera where the light is, a hair beside it, and looking as it does: what is seen is what is lit."""
+def put_camera_at_light(scene: Scene) -> Scene:
+    """Put the camera just beside the light with its direction: everything visible is lit."""
     light, diagonal = scene.spotlight, scene.geometry.diagonal
-    place = np.asarray(light.position) + 1e-7 * diagonal * np.asarray(across(light.axis))
-    camera = Camera(vec3(place), vec3(place + light.axis * diagonal), across(light.axis), min(light.fov, 120.0))
+    place = np.asarray(light.position) + 1e-7 * diagonal * np.asarray(perpendicular(light.axis))
+    camera = Camera(vec3(place), vec3(place + light.axis * diagonal), perpendicular(light.axis), min(light.fov, 120.0))
     return replace(scene, camera=camera)

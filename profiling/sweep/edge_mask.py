@@ -150,15 +150,15 @@ def load_or_find(folder: Path, scene: Scene, size: tuple[int, int], progress: Pr
 
 
 def save(folder: Path, mask: Mask, scene_hash: str) -> None:
-    """Write the mask, a picture of it (white pixels count) and its record; each file appears whole or not at all."""
+    """Write the mask, a picture of it (white pixels count) and its metadata; each file appears whole or not at all."""
     height, width = mask.counts.shape
-    record = {"scene_hash": scene_hash, "size": [width, height], "left_out": mask.left_out, "image_hash": mask.hash}
+    metadata = {"scene_hash": scene_hash, "size": [width, height], "left_out": mask.left_out, "image_hash": mask.hash}
     Image(None, np.repeat(np.where(mask.counts, 255, 0).astype(np.uint8)[..., None], 3, axis=2)).save(folder / PICTURE)
 
     def fill(part: Path) -> None:
         with part.open("wb") as file:
             np.save(file, mask.counts)
-        write_json(metadata_path(folder / FILE), record)
+        write_json(metadata_path(folder / FILE), metadata)
 
     write_whole(folder / FILE, fill)
 
@@ -169,11 +169,11 @@ def read(folder: Path, scene_hash: str, size: tuple[int, int]) -> Mask | None:
     try:
         with file.open("rb") as stream:
             counts = np.load(stream)
-        record = read_metadata(file, size)
+        metadata = read_metadata(file, size)
     except (OSError, ValueError, EOFError, SettingError):
         return None  # it is made again
     if counts.dtype != np.bool_ or counts.shape != (size[1], size[0]) or not (folder / PICTURE).is_file():
         return None
     mask = Mask(counts)
-    whole = record.get("scene_hash") == scene_hash and record.get("image_hash") == mask.hash
+    whole = metadata.get("scene_hash") == scene_hash and metadata.get("image_hash") == mask.hash
     return mask if whole else None

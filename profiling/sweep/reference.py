@@ -30,10 +30,10 @@ MARGIN = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """A reference image. radiance: (H, W, 3). record: the contents of its JSON file."""
+    """A reference image. radiance: (H, W, 3). metadata: the contents of its JSON file."""
 
     radiance: Array
-    record: Mapping[str, Any]
+    metadata: Mapping[str, Any]
 
     @property
     def hash(self) -> str:
@@ -43,12 +43,12 @@ class Truth:
     @property
     def hit(self) -> float | None:
         """Fraction of the pixels that show a surface."""
-        return self.record.get("hit_fraction") or None
+        return self.metadata.get("hit_fraction") or None
 
     @property
     def noise(self) -> float | None:
         """relMSE of its own noise, None if unknown."""
-        value = self.record.get("noise")
+        value = self.metadata.get("noise")
         return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
@@ -60,22 +60,22 @@ def read(path: Path, scene: Scene, size: tuple[int, int], time: float = 0.0) -> 
         raise SettingError(
             f"{path}: is {width}x{height}, but the sweep is {size[0]}x{size[1]}; give --size {width}x{height}"
         )
-    record = read_metadata(path, size)
-    if not record:
+    metadata = read_metadata(path, size)
+    if not metadata:
         raise SettingError(
-            f"{path}: has no record {metadata_path(path).name} beside it; make it by: deferred-ir reference"
+            f"{path}: has no metadata file {metadata_path(path).name} beside it; make it by: deferred-ir reference"
         )
-    if record["scene_hash"] != scene.hash:
+    if metadata["scene_hash"] != scene.hash:
         raise SettingError(
-            f"{path}: shows the scene {record.get('scene')} ({record['scene_hash']}), but the sweep is of {scene.name} "
-            f"({scene.hash}); make one by: deferred-ir reference"
+            f"{path}: shows the scene {metadata.get('scene')} ({metadata['scene_hash']}), but the sweep is of "
+            f"{scene.name} ({scene.hash}); make one by: deferred-ir reference"
         )
-    if scene.moves and record.get("time") != time:
+    if scene.moves and metadata.get("time") != time:
         raise SettingError(
-            f"{path}: shows the scene at {record.get('time', 0.0)} s, but the sweep's frames end at {time} s; give "
-            f"--time {record.get('time', 0.0)}"
+            f"{path}: shows the scene at {metadata.get('time', 0.0)} s, but the sweep's frames end at {time} s; give "
+            f"--time {metadata.get('time', 0.0)}"
         )
-    return Truth(radiance, record)
+    return Truth(radiance, metadata)
 
 
 def load_or_trace(
@@ -95,7 +95,7 @@ def load_or_trace(
     """
     bounces = int(scene.render.set.get("vpl.bounces", 1))
     truth = _load(folder, scene, size, bounces)
-    if truth and truth.record.get("sweep") == sweep:
+    if truth and truth.metadata.get("sweep") == sweep:
         return truth
     if truth is None:
         truth = _trace(scene, size, FIRST_SPP, bounces, seed=0, bar=bar)
@@ -103,13 +103,13 @@ def load_or_trace(
     probes = images()
     while True:
         smallest = min(relmse(image, truth.radiance, truth.hit)[0] for image in probes)
-        spp = int(truth.record["spp"])
+        spp = int(truth.metadata["spp"])
         if (truth.noise or 0.0) * MARGIN <= MOST_NOISE * smallest or 2 * spp > MOST_SPP:
             break
         # Double the paths. The seed is new: all seeds before were smaller.
         truth = _mean(truth, _trace(scene, size, spp, bounces, seed=spp, bar=bar))
         _save(folder, truth)
-    truth = Truth(truth.radiance, {**truth.record, "sweep": dict(sweep)})
+    truth = Truth(truth.radiance, {**truth.metadata, "sweep": dict(sweep)})
     _save(folder, truth)
     return truth
 
@@ -122,7 +122,7 @@ def _trace(scene: Scene, size: tuple[int, int], spp: int, bounces: int, *, seed:
 
 def _mean(first: Truth, second: Truth) -> Truth:
     """Return the mean of two independent images with the same number of paths; their variances add."""
-    a, b = first.record, second.record
+    a, b = first.metadata, second.metadata
     radiance = (0.5 * (first.radiance.astype(np.float64) + second.radiance)).astype(np.float32)
     summed = {
         "spp": a["spp"] + b["spp"],
@@ -139,7 +139,7 @@ def _save(folder: Path, truth: Truth) -> None:
     def fill(part: Path) -> None:
         with part.open("wb") as stream:
             np.save(stream, np.asarray(truth.radiance, np.float32))
-        write_json(metadata_path(file), {**truth.record, "image_hash": truth.hash})
+        write_json(metadata_path(file), {**truth.metadata, "image_hash": truth.hash})
 
     write_whole(file, fill)
 
@@ -149,9 +149,9 @@ def _load(folder: Path, scene: Scene, size: tuple[int, int], bounces: int) -> Tr
     file = folder / FILE
     try:
         radiance = read_radiance(file)
-        record = read_metadata(file, size)
+        metadata = read_metadata(file, size)
     except SettingError:
         return None  # it is traced again
-    truth = Truth(radiance, record)
-    usable = record.get("scene_hash") == scene.hash and record.get("bounces") == bounces
-    return truth if usable and record.get("image_hash") == truth.hash else None
+    truth = Truth(radiance, metadata)
+    usable = metadata.get("scene_hash") == scene.hash and metadata.get("bounces") == bounces
+    return truth if usable and metadata.get("image_hash") == truth.hash else None

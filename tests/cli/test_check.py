@@ -238,7 +238,7 @@ def test_what_is_not_finite_bounds_nothing(capsys, few_cases, monkeypatch, tmp_p
     """A picture of the scene itself that is no picture must not let all others pass."""
     path, rays = tmp_path / "f.json", replace(few_cases[0], against="rays", slack=2.0)
     monkeypatch.setattr("deferred_ir.profiling.checks.cases.CASES", (rays,))
-    monkeypatch.setattr("deferred_ir.profiling.checks.extremes.Judge.usual", lambda *_: float("inf"))
+    monkeypatch.setattr("deferred_ir.profiling.checks.extremes.Judge.usual_error", lambda *_: float("inf"))
     assert main(["check", "cornell", "--device", "software", "--json", str(path)]) == 1
     assert "FAILS" in capsys.readouterr().out.splitlines()[1]
     (row,) = json.loads(path.read_text())["stability"]

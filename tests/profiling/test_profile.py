@@ -330,7 +330,7 @@ def test_a_reference_of_something_else_is_refused(whole, tmp_path, capsys):
     assert "is 32x32" in line
     np.save(tmp_path / "bare.npy", np.ones((32, 32, 3), np.float32))
     line = fault(capsys, "cornell", "--size", "32x32", *given, "--reference", str(tmp_path / "bare.npy"))
-    assert "no record bare.json" in line
+    assert "no metadata file bare.json" in line
     assert not (tmp_path / "out").exists()
 
 

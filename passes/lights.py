@@ -36,18 +36,20 @@ class Lights(Pass):
         records = pack_lights(frame.scene)
         versions = io.state.update(records, frame.scene)
         if frame.by_view and find_shining(records).any():
-            reaches = find_reaching(_cones(frame.scene), frame.buffers.clusters, frame.scene.camera, frame.size)
+            seen = find_reaching(_list_cones(frame.scene), frame.buffers.clusters, frame.scene.camera, frame.size)
+            reaches = np.logical_or.reduceat(seen, records["view"].astype(int))
             records["emission"][~reaches] = 0
             io.count(LIGHTS_DROPPED.name, int((~reaches).sum()))
         io["lights"].write(records, versions)
 
 
-def _cones(scene: Scene) -> np.ndarray:
-    """Return the pyramids about the lights' cones, AXES (n,)."""
-    light = scene.spotlight
-    cones = np.zeros(1, AXES)
-    cones["position"] = light.position
-    cones["x_axis"], cones["y_axis"], cones["z_axis"] = make_axes(light.axis[None], light.fov)
+def _list_cones(scene: Scene) -> np.ndarray:
+    """Return the pyramids about what the lights' views cover, AXES (m,)."""
+    views = [view for light in scene.lights for view in light.list_views()]
+    cones = np.zeros(len(views), AXES)
+    for cone, view in zip(cones, views, strict=True):
+        cone["position"] = view.position
+        cone["x_axis"], cone["y_axis"], cone["z_axis"] = (axis[0] for axis in make_axes(view.axis[None], view.fov))
     return cones
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from deferred_ir.base.arrays import Ints
 from deferred_ir.base.versions import new_versions
 from deferred_ir.graph.ports import Buffer, Output
-from deferred_ir.scene.lights.spot import one_minus_cos
 from deferred_ir.scene.scene import Scene
 from deferred_ir.vpls.stale_maps import ModelMoves
 
@@ -36,10 +35,12 @@ def describe_output() -> Output:
 
 def pack_lights(scene: Scene) -> np.ndarray:
     """Return LIGHT records (n,) of the scene's lights."""
-    light = scene.spotlight
-    records = np.zeros(1, LIGHT)
-    records["position"], records["axis"], records["emission"] = light.position, light.axis, light.emission
-    records["one_minus_cos"], records["radius"] = one_minus_cos(light.fov), light.radius
+    records, view = np.zeros(len(scene.lights), LIGHT), 0
+    for record, light in zip(records, scene.lights, strict=True):
+        record["view"] = view
+        for name, value in light.describe().items():
+            record[name] = value
+        view += len(light.list_views())
     return records
 
 

@@ -1,4 +1,4 @@
-"""Direct irradiance by the spotlight with ray-cast shadows, by the formula of shaders/lib/lights/light.glsl."""
+"""Direct irradiance by one light with ray-cast shadows, by the formulas of shaders/lib/lights."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from deferred_ir.base.parallel import run_in_order
 from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.sampling import pixel_blocks, streams
-from deferred_ir.sampling.warps import build_basis, square_to_disc
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.sampling.warps import square_to_disc
+from deferred_ir.scene.lights.base import Light
 
 PIXELS = 1 << 13
 """Pixels of a task: few enough for their arrays to stay in a core's cache."""
@@ -20,12 +20,12 @@ PIXELS = 1 << 13
 GOLDEN_ANGLE = np.pi * (3 - 5**0.5)
 
 
-def compute_irradiance(light: Spotlight, tracer: Tracer, at: Hits, rng: np.random.Generator) -> Array:
-    """Return the irradiance on surfaces `at` (n, all hit) divided by the spotlight's emission, float64 (n,).
+def compute_irradiance(light: Light, tracer: Tracer, at: Hits, rng: np.random.Generator) -> Array:
+    """Return the irradiance on surfaces `at` (n, all hit) divided by the light's emission, float64 (n,).
 
-    A disc light is sampled at one random point for each surface.
+    A light that has an area is sampled at one random point for each surface.
     """
-    points = square_to_disc(rng.random((len(at.face), 2))) if light.radius > 0 else None
+    points = square_to_disc(rng.random((len(at.face), 2))) if light.has_area else None
     return _irradiate(light, tracer, at, points)
 
 
@@ -46,7 +46,7 @@ def trace_spotlight(job: PixelJob, *, samples: int) -> Array:
     def work(task: tuple[int, slice]) -> Array:
         number, rows = task
         at = seen.rows(rows)
-        if light.radius == 0:
+        if not light.has_area:
             return _irradiate(light, tracer, at, None)
         places = pixel_blocks.jitter(index[rows, 0], grid, streams.shadow_rays(seed, number)) + shift
         total = np.zeros(len(at.pixel))
@@ -71,18 +71,15 @@ def _spiral(places: Array, i: int, count: int) -> Array:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
-def _irradiate(light: Spotlight, tracer: Tracer, at: Hits | Surfaces, points: Array | None) -> Array:
+def _irradiate(light: Light, tracer: Tracer, at: Hits | Surfaces, points: Array | None) -> Array:
     """Return irradiance over emission on n surfaces, float64 (n,); points: on the unit disc of a disc light, (n, 2)."""
-    source = np.broadcast_to(np.asarray(light.position, float), at.position.shape)
-    if points is not None:
-        right, up = build_basis(light.axis)
-        source = source + light.radius * (points[:, :1] * right + points[:, 1:] * up)
+    source = light.locate(points, len(at.position))
     to = source - at.position
     square = np.maximum(_dot(to, to), np.finfo(float).tiny)
     to /= np.sqrt(square)[:, None]
     facing = _dot(to, at.normal) > 0
     strength = np.maximum(_dot(to, at.shading_normal), 0) * facing
-    strength *= np.maximum(-to @ light.axis, 0) * light.cone(-to) / square
+    strength *= light.radiate(-to) / square
     lit = np.flatnonzero(strength)
     starts = tracer.lift(at.position[lit], at.normal[lit])
     strength[lit[tracer.occluded(starts, source[lit])]] = 0

@@ -17,6 +17,7 @@ import numpy as np
 from deferred_ir.base.errors import SceneError, SettingError
 from deferred_ir.scene.camera import Camera, view_fault
 from deferred_ir.scene.geometry import Geometry, Model
+from deferred_ir.scene.lights.base import Light
 from deferred_ir.scene.lights.spot import Spotlight
 
 
@@ -80,9 +81,14 @@ class Scene:
         return digest.hexdigest()[:16]
 
     @property
+    def lights(self) -> tuple[Light, ...]:
+        """All direct lights."""
+        return (self.spotlight,)
+
+    @property
     def emits(self) -> bool:
         """Whether a light shines."""
-        return any(self.spotlight.emission)
+        return any(any(light.emission) for light in self.lights)
 
     @property
     def moves(self) -> bool:

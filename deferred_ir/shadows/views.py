@@ -42,13 +42,14 @@ def describe_output() -> Output:
 
 def pack_views(frame: Frame, params: MapParams, edge: int) -> np.ndarray:
     """Return VIEW records (n,) of the scene's lights, in order, each with a layer of `edge` texels to itself."""
-    light = frame.scene.spotlight
-    views = np.zeros(1, VIEW)
-    views["position"] = light.position
-    fill_view(views, light.axis[None], light.fov)
+    described = [view for light in frame.scene.lights for view in light.list_views()]
+    views = np.zeros(len(described), VIEW)
+    for i, view in enumerate(described):
+        views["position"][i] = view.position
+        fill_view(views[i : i + 1], view.axis[None], view.fov)
+        views["paraboloid"][i] = np.float32(one_minus_cos(view.fov)) > np.float32(one_minus_cos(WIDEST_PLANAR))
     views["position"] += views["z_axis"] * (LIFT * np.float32(frame.near))
     views["size"] = params.spot_size
-    views["paraboloid"] = np.float32(one_minus_cos(light.fov)) > np.float32(one_minus_cos(WIDEST_PLANAR))
     views["rectangle"][:, 2] = np.float32(params.spot_size) / np.float32(edge)
     views["rectangle"][:, 3] = np.arange(len(views))
     return views

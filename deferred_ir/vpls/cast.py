@@ -23,8 +23,8 @@ from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.sampling import streams
 from deferred_ir.sampling.patterns import Pattern, resample_systematically, sample_unit_disc, sample_unit_square
-from deferred_ir.sampling.warps import build_basis, lift_to_hemisphere, square_to_disc
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.sampling.warps import lift_to_hemisphere, square_to_disc
+from deferred_ir.scene.lights.base import Light
 from deferred_ir.vpls.kernel import cosine_ratio
 
 
@@ -48,7 +48,7 @@ NONE = Vpls(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, in
 
 
 def cast(
-    light: Spotlight, tracer: Tracer, count: int, pattern: Pattern = "random", seed: int = 0, *, bounces: int = 1
+    light: Light, tracer: Tracer, count: int, pattern: Pattern = "random", seed: int = 0, *, bounces: int = 1
 ) -> Vpls:
     """Cast `count` rays and follow them for `bounces` bounces. Returns the VPLs, those of the first bounce first.
 
@@ -56,9 +56,7 @@ def cast(
     """
     if count == 0:
         return NONE
-    origins, directions = _start_rays(light, count, pattern, seed)
-    radius = np.sin(np.radians(light.fov) / 2)
-    carried = np.multiply.outer(light.cone(directions) * radius**2 / count, np.asarray(light.emission, float))
+    origins, directions, carried = _start_rays(light, count, pattern, seed)
     left = (carried @ LUMINANCE).sum()
     by_bounce = [_make_vpls(tracer, origins, directions, carried)]
     for bounce in range(1, bounces):
@@ -81,16 +79,13 @@ def cast(
     return Vpls(*(np.concatenate([getattr(part, f.name) for part in by_bounce]) for f in fields(Vpls)))
 
 
-def _start_rays(light: Spotlight, count: int, pattern: Pattern, seed: int) -> tuple[Array, Array]:
-    """Return origins and unit directions of the rays of the first bounce, (n, 3) each."""
-    points = sample_unit_disc(pattern, count, seed) * np.sin(np.radians(light.fov) / 2)
-    origins = np.broadcast_to(np.asarray(light.position, float), (count, 3))
-    if light.radius > 0:
+def _start_rays(light: Light, count: int, pattern: Pattern, seed: int) -> tuple[Array, Array, Array]:
+    """Return the rays of the first bounce: origins, unit directions and what they carry, (n, 3) each."""
+    places = None
+    if light.has_area:
         square = sample_unit_square(pattern, count, streams.light_disc_pattern(seed))
-        on_disc = square_to_disc(streams.light_disc(seed).permutation(square))
-        right, up = build_basis(light.axis)
-        origins = origins + light.radius * (on_disc[:, :1] * right + on_disc[:, 1:] * up)
-    return origins, lift_to_hemisphere(points, light.axis[None])
+        places = square_to_disc(streams.light_disc(seed).permutation(square))
+    return light.emit(sample_unit_disc(pattern, count, seed), places)
 
 
 def _make_vpls(tracer: Tracer, origins: Array, directions: Array, carried: Array) -> Vpls:

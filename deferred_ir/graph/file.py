@@ -136,8 +136,18 @@ def _read(path: Path, above: tuple[Path, ...], passes: Mapping[str, type[Pass]])
             known = base.get("passes", {})
             raise GraphError(f"{path.name}: passes.{name}: nothing to remove{did_you_mean(name, known)}")
         del base["passes"][name], table["passes"][name]
+        _unwire(base["passes"], name)
     table = _with_new_names(path, table, base, passes)
     return _cut(_overlay(base, {key: value for key, value in table.items() if key != "extends"}))
+
+
+def _unwire(tables: Mapping[str, Any], removed: str) -> None:
+    """Cut the inputs of passes that are wired to the pass `removed`."""
+    for entry in tables.values():
+        wires = entry.get("inputs") if isinstance(entry, dict) else None
+        if isinstance(wires, dict):
+            for port in [port for port, source in wires.items() if str(source).partition(".")[0] == removed]:
+                del wires[port]
 
 
 def _with_new_names(

@@ -166,7 +166,7 @@ def test_false_cuts_wires_and_outputs_of_the_extended_graph(tmp_path):
     text = 'extends = "deferred"\n[outputs]\ndisplay = false\n[passes]\nshadow_maps = false\ntonemap = false\n'
     graph = load_graph(write(tmp_path, text + "lighting.inputs = { shadows = false, blockers = false }\n"))
     plan = compile(graph, list(graph.outputs))
-    assert [step.name for step in plan.steps] == ["vpl", "gbuffer", "lighting"]
+    assert [step.name for step in plan.steps] == ["lights", "vpl", "gbuffer", "lighting"]
     assert plan.steps[-1].sources["shadows"] is None
 
 
@@ -180,6 +180,13 @@ def test_false_removes_a_pass(tmp_path):
     write(tmp_path, SMALL, "base.toml")
     text = 'extends = "base.toml"\n[outputs]\nimage = "start.out"\n[passes]\nend = false\n'
     assert set(load_graph(write(tmp_path, text), {}, OWN).nodes) == {"start"}
+
+
+def test_removing_a_pass_cuts_what_is_wired_to_it(tmp_path):
+    text = 'extends = "deferred"\n[passes]\nshadow_maps = false\n'
+    (lighting,) = [node for node in load_graph(write(tmp_path, text)).nodes.values() if node.name == "lighting"]
+    assert not {"shadows", "blockers", "views"} & lighting.inputs.keys()
+    assert lighting.inputs["depth"] == "gbuffer.depth"
 
 
 def test_a_removed_pass_must_be_there(tmp_path):

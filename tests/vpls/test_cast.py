@@ -234,7 +234,7 @@ def test_a_round_light_sends_out_as_much_as_a_point():
 
 
 def test_a_round_lights_rays_start_on_its_disc():
-    origins, directions = vpls._start_rays(replace(LIGHT, radius=0.2), 4096, "sobol", 0)
+    origins, directions, _ = vpls._start_rays(replace(LIGHT, radius=0.2), 4096, "sobol", 0)
     off = origins - LIGHT.position
     np.testing.assert_allclose(off @ LIGHT.axis, 0, atol=1e-12)
     radius = np.linalg.norm(off, axis=1)

@@ -15,7 +15,7 @@ from deferred_ir.base.arrays import Vec3
 from deferred_ir.base.errors import SceneError, did_you_mean, format_value
 from deferred_ir.base.image_size import parse_size
 from deferred_ir.base.toml_tables import Faults, Table, read_toml
-from deferred_ir.scene.camera import Camera, view_fault
+from deferred_ir.scene.camera import Camera, find_view_fault
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.motion import (
     CameraMotion,
@@ -195,7 +195,7 @@ def _read_fov(table: Table, default: float) -> float:
 
 def _check_view(table: Table, key: str, position: Vec3, look_at: Vec3, up: Vec3 | None = None) -> None:
     """Note a fault if the view has no direction, or `up` lies along it. key: that of look_at."""
-    fault = view_fault(position, look_at, up)
+    fault = find_view_fault(position, look_at, up)
     if fault:
         name, why = fault
         table.fault(key if "[" in key or name == "look_at" else name, why)

@@ -17,7 +17,7 @@ from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.scene.motion import CameraMotion
 
 
-def view_fault(position: Vec3, look_at: Vec3, up: Vec3 | None = None) -> tuple[str, str] | None:
+def find_view_fault(position: Vec3, look_at: Vec3, up: Vec3 | None = None) -> tuple[str, str] | None:
     """Return the key at fault and why, if a view has no direction or `up` lies along it, else None."""
     view = np.subtract(look_at, position)
     length = math.hypot(*view)

@@ -12,7 +12,7 @@ from deferred_ir.base.arrays import Array, Vec3
 FRAMES_PER_SECOND = 30
 
 
-def spline(times: tuple[float, ...], points: tuple[Vec3, ...], time: float) -> Vec3:
+def evaluate_spline(times: tuple[float, ...], points: tuple[Vec3, ...], time: float) -> Vec3:
     """Evaluate the natural cubic spline through `points` at `times`; before and after them it stays at the ends."""
     time = float(np.clip(time, times[0], times[-1]))
     if len(times) == 1:
@@ -34,7 +34,7 @@ class ViewKeyframes:
     def move(self, position: Vec3, look_at: Vec3, time: float) -> tuple[Vec3, Vec3]:
         """Return position and look_at at `time`; those of the view at rest do not matter."""
         del position, look_at
-        return spline(self.times, self.positions, time), spline(self.times, self.look_ats, time)
+        return evaluate_spline(self.times, self.positions, time), evaluate_spline(self.times, self.look_ats, time)
 
 
 class CameraMotion(ViewKeyframes):

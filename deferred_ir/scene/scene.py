@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.errors import SceneError, SettingError
-from deferred_ir.scene.camera import Camera, view_fault
+from deferred_ir.scene.camera import Camera, find_view_fault
 from deferred_ir.scene.geometry import Geometry, Model
 from deferred_ir.scene.lights.base import Light
 from deferred_ir.scene.lights.spot import Spotlight
@@ -108,8 +108,8 @@ class Scene:
             return self
         camera, light = self.camera.at(time), self.spotlight.at(time)
         views = {
-            "camera": view_fault(camera.position, camera.look_at, camera.up),
-            "spotlight": view_fault(light.position, light.look_at),
+            "camera": find_view_fault(camera.position, camera.look_at, camera.up),
+            "spotlight": find_view_fault(light.position, light.look_at),
         }
         for name, fault in views.items():
             if fault:

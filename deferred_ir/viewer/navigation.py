@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Vec3
-from deferred_ir.scene.camera import Camera, view_fault
+from deferred_ir.scene.camera import Camera, find_view_fault
 from deferred_ir.scene.lights.spot import Spotlight
 
 UP: Vec3 = (0.0, 1.0, 0.0)
@@ -20,7 +20,7 @@ STEEPEST = 1.55
 
 def as_camera(light: Spotlight) -> Camera:
     """Return the view from the light, its cone as high as the picture."""
-    up = UP if view_fault(light.position, light.look_at, UP) is None else SIDE
+    up = UP if find_view_fault(light.position, light.look_at, UP) is None else SIDE
     return Camera(light.position, light.look_at, up, light.fov)
 
 

@@ -1,4 +1,4 @@
-"""Ctrl-C arrives, whoever is importing what."""
+"""Ctrl-C arrives, whatever is being imported."""
 
 import subprocess
 import sys
@@ -32,7 +32,7 @@ def test_an_interrupt_during_an_import_waits_for_its_end(tmp_path):
     assert done.stdout.splitlines() == ["interrupted, with the module whole: True"], done.stderr
 
 
-def test_outside_imports_it_comes_at_once():
+def test_an_interrupt_outside_imports_comes_at_once():
     code = (
         "import os, signal; from deferred_ir.base import interrupts\n"
         "try:\n"
@@ -43,7 +43,7 @@ def test_outside_imports_it_comes_at_once():
     assert done.stdout == "at once\n"
 
 
-def test_a_library_that_is_at_work_is_not_torn_apart():
+def test_a_working_library_is_not_interrupted():
     code = (
         "import os, signal, sys; from deferred_ir.base import interrupts\n"
         "library = {'__name__': 'library', 'os': os, 'signal': signal}\n"
@@ -61,7 +61,7 @@ def test_a_library_that_is_at_work_is_not_torn_apart():
     assert done.stdout == "worked 100000\n", done.stderr
 
 
-def test_handlers_are_given_back_and_no_interrupt_is_lost_on_the_way():
+def test_handlers_are_restored_and_no_interrupt_is_lost():
     code = (
         "import os, signal; from deferred_ir.base import interrupts\n"
         "before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGALRM)\n"

@@ -41,7 +41,7 @@ MENDED = {
 
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
-    """What each of the broken files came to, in a process of their own."""
+    """Return the outcome of each broken file, loaded in another process."""
     folder = tmp_path_factory.mktemp("bad")
     script = Path(bad_files.__file__).with_name("bad_files_process.py")
     run = subprocess.run(

@@ -38,7 +38,7 @@ def camera_hits(scene: Scene, side: int = 96) -> tuple[Tracer, np.ndarray, np.nd
 
 
 def mean_irradiance(scene: Scene) -> float:
-    """By the formula of the light model, at other points than the choice was made with."""
+    """Compute it by the formula of the light model, at other points than those of the choice."""
     tracer, hit, position, normal = camera_hits(scene)
     position, normal = tracer.lift(position[hit], normal[hit]), normal[hit]
     light = scene.spotlight

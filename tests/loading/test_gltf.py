@@ -1,4 +1,4 @@
-"""What of glTF files trimesh alone would lose, round or pass over."""
+"""Reading from glTF files what trimesh alone would lose, round or skip."""
 
 from __future__ import annotations
 

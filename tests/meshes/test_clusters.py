@@ -1,4 +1,4 @@
-"""Culling clusters of triangles: maps are the same to the last bit as if every light drew every triangle."""
+"""Culling clusters of triangles leaves maps the same to the last bit as if every light drew every triangle."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WHOLE = 10**9
 
 
 def lights_among(mesh: Mesh, seed: int, count: int = 8, fov: float = 150.0) -> np.ndarray:
-    """Lights on corners, on faces and between them that look along axes, into planes and anywhere."""
+    """Make lights on corners, on faces and between them that look along axes, within planes and anywhere."""
     rng = np.random.default_rng(seed)
     faces = mesh.positions[mesh.faces]
     low, high = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
@@ -56,7 +56,7 @@ def test_clusters_of_triangles_of_one_size_are_full_but_for_the_last(count):
 
 
 def test_a_cluster_holds_triangles_of_like_size():
-    """So a large triangle does not count as bent, with all its neighbours, in maps in which they are flat."""
+    """Otherwise the small neighbours of a large triangle would count as bent in maps in which they are flat."""
     mesh = triangle_soup(2, 400)
     corners = mesh.positions[mesh.faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)

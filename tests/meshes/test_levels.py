@@ -1,4 +1,4 @@
-"""Levels of detail for the maps of VPLs: chunks fit together, and no map draws what its texels could tell apart."""
+"""Levels of detail for the maps of VPLs: chunks fit together, and no map is coarser than its texels."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from deferred_ir.shadows.settings import MapParams
 
 @pytest.fixture(scope="module")
 def balls():
-    """A room with fine spheres in it, of which a map need not draw the farther ones as they are."""
+    """Make a room with fine spheres, of which the farther ones need not be drawn in full detail."""
     meshes = [box((-1, -1, -1), (1, 1, 1))]
     for centre in ((-0.6, -0.7, -0.6), (0.5, -0.6, 0.0), (0.1, -0.2, -0.7)):
         ball = sphere(0.25, 3)
@@ -96,7 +96,7 @@ def test_only_one_mesh_can_stand_in(renderer):
 
 @pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
 def test_a_texel_hardly_shows_and_many_do(renderer, balls, projection):
-    """Indirect light, against that of maps which draw the scene."""
+    """Indirect light is compared with that of maps which draw the full scene."""
     images = [
         renderer((64, 64), set={"shadow_maps.vpl_deviation": most, "shadow_maps.projection": projection})
         .render(balls, vpls=32)

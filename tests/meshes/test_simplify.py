@@ -1,4 +1,4 @@
-"""Simplified meshes keep to their deviation, both ways, whatever the mesh."""
+"""Simplified meshes keep to their deviation in both directions, whatever the mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from deferred_ir.meshes.simplify import simplify, weld_vertices
 
 
 def sampled(positions, faces, seed):
-    """Points all over the triangles, (n, 3), their corners among them."""
+    """Sample points all over the triangles, with their corners, (n, 3)."""
     rng = np.random.default_rng(seed)
     weights = rng.dirichlet((0.7, 0.7, 0.7), (len(faces), 8))
     corners = positions[faces]
@@ -19,7 +19,7 @@ def sampled(positions, faces, seed):
 
 
 def farthest(positions, faces, other, seed):
-    """The largest distance of sampled points on the first triangles from the second."""
+    """Return the largest distance of sampled points on the first triangles from the second."""
     from trimesh.triangles import closest_point
 
     points = np.random.default_rng(seed).permutation(sampled(positions, faces, seed))[:100]

@@ -1,4 +1,4 @@
-"""Maps of VPLs that draw a mesh without long edges: how it is made, and that straight edges in it do."""
+"""Maps of VPLs that draw a mesh without long edges: how it is split, and that straight edges suffice."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ POINT = st.tuples(COORDINATE, COORDINATE, COORDINATE)
 
 
 def edges(points, faces):
-    """Lengths of all edges, (F, 3)."""
+    """Return the lengths of all edges, (F, 3)."""
     corners = points[faces]
     return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
 
 
 def areas(points, faces):
-    """Vector areas, (F, 3)."""
+    """Return vector areas, (F, 3)."""
     a, b, c = (points[faces[:, i]] for i in range(3))
     return np.cross(b - a, c - a) / 2
 
@@ -157,7 +157,7 @@ def test_a_light_does_not_see_the_surface_it_is_on(renderer, tmp_path, edge, pre
 
 
 def mismatch(**settings):
-    """Share of pairs of a pixel and a VPL of which maps and rays disagree."""
+    """Return the fraction of pairs of a pixel and a VPL about which maps and rays disagree."""
     small = {"shadow_maps.spot_size": 64, "vpl.count": 8, "vpl.fov": 179.9}
     options = visibility.Options((64, 64), 20_000, (512,), device="software", settings=small | settings)
     found = next(row for row in visibility.rows(crooked_room(), options) if row.lights == "vpls")

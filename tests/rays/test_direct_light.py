@@ -1,4 +1,4 @@
-"""The spotlight by rays for all pixels, held against the path tracer, which has its own formula and its own samples."""
+"""Direct light by rays, compared with the path tracer, which has its own formula and samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rays against scenes of which everything is known."""
+"""Rays in scenes about which everything is known."""
 
 from __future__ import annotations
 

@@ -30,18 +30,18 @@ def sites(draw, least=1):
     return points[rng.integers(0, count, count)] if kind == "twice" else points
 
 
-def by_place(sites, shares):
-    """Shares of sites that coincide, as one: they have their cell in common."""
-    return np.bincount(cKDTree(sites).query(sites)[1], shares, minlength=len(sites))
+def add_up_coincident(sites, areas):
+    """Add up the areas of sites that coincide, since they have their cell in common."""
+    return np.bincount(cKDTree(sites).query(sites)[1], areas, minlength=len(sites))
 
 
 @given(sites())
-def test_shares_are_those_of_the_points_that_are_nearest(sites):
-    shares = VoronoiCells(sites).areas()
-    assert shares.min() >= 0
-    assert shares.sum() == pytest.approx(1, abs=1e-9)
+def test_areas_are_those_of_the_nearest_points(sites):
+    areas = VoronoiCells(sites).areas()
+    assert areas.min() >= 0
+    assert areas.sum() == pytest.approx(1, abs=1e-9)
     counted = np.bincount(cKDTree(sites).query(GRID)[1], minlength=len(sites)) / len(GRID)
-    np.testing.assert_allclose(by_place(sites, shares), by_place(sites, counted), atol=6e-3)
+    np.testing.assert_allclose(add_up_coincident(sites, areas), add_up_coincident(sites, counted), atol=6e-3)
 
 
 @given(sites(), st.floats(0.1, 1.0))
@@ -54,18 +54,20 @@ def test_no_point_of_the_disc_is_farther_from_all_sites(sites, radius):
 
 
 @given(sites(least=0), st.integers(1, 5))
-def test_sites_that_are_added_are_as_if_they_had_been_there(sites, count):
+def test_adding_sites_equals_building_with_them(sites, count):
     more = np.random.default_rng(len(sites)).uniform(-0.7, 0.7, (count, 2))
     grown = VoronoiCells(sites)
     for site in more:
         grown.add(site)
     every = np.concatenate([sites, more])
     whole = VoronoiCells(every)
-    np.testing.assert_allclose(by_place(every, grown.areas()), by_place(every, whole.areas()), atol=1e-6)
+    np.testing.assert_allclose(
+        add_up_coincident(every, grown.areas()), add_up_coincident(every, whole.areas()), atol=1e-6
+    )
     np.testing.assert_allclose(grown.find_emptiest_circle()[1], whole.find_emptiest_circle()[1], atol=1e-6)
 
 
-def test_one_site_has_it_all_and_the_farthest_point_is_opposite():
+def test_one_site_has_the_whole_disc_and_the_farthest_point_is_opposite():
     cells = VoronoiCells([[0.3, 0.4]])
     assert cells.areas() == pytest.approx([1])
     centre, distance = cells.find_emptiest_circle()

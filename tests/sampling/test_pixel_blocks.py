@@ -27,7 +27,7 @@ def test_every_window_of_a_block_has_each_cell_once(block, samples, x, y, turn):
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 16, 64, 256])
 def test_cells_tile_the_square(count):
-    """Where cells overlapped or left gaps, points drawn evenly from all would not be even."""
+    """If cells overlapped or left gaps, points drawn evenly from all would not be even."""
     grid = pixel_blocks.find_lattice(count)
     steps = grid[2].astype(float)
     assert abs(np.linalg.det(steps)) * count == pytest.approx(1, rel=1e-4)

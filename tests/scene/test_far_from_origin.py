@@ -1,4 +1,4 @@
-"""Scenes far from the origin: 32 bits hold them near it."""
+"""Scenes far from the origin are moved to it, where 32-bit floats are fine enough."""
 
 from __future__ import annotations
 

@@ -19,34 +19,6 @@ def unit(*vector: float) -> np.ndarray:
     return np.array(vector) / np.linalg.norm(vector)
 
 
-@given(st.tuples(COORDINATE, COORDINATE, COORDINATE).filter(lambda v: math.hypot(*v) > 1e-3))
-def test_frames_are_orthonormal_and_right_handed(vector):
-    check_frame(unit(*vector))
-
-
-@pytest.mark.parametrize(
-    "axis",
-    [(0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (1, 0, -0.0), (1e-9, 0, -1), (1e-20, 0, -1)],
-)
-def test_frames_hold_at_the_poles(axis):
-    check_frame(unit(*axis))
-
-
-def check_frame(axis: np.ndarray) -> None:
-    right, up = build_basis(axis)
-    rows = np.stack([right, up, axis])
-    np.testing.assert_allclose(rows @ rows.T, np.eye(3), atol=1e-12)
-    np.testing.assert_allclose(np.cross(right, up), axis, atol=1e-12)
-
-
-def test_frames_of_many_axes_are_those_of_each():
-    axes = np.random.default_rng(1).normal(size=(5, 4, 3))
-    axes /= np.linalg.norm(axes, axis=-1, keepdims=True)
-    right, up = build_basis(axes)
-    assert right.shape == up.shape == (5, 4, 3)
-    np.testing.assert_array_equal(right[2, 3], build_basis(axes[2, 3])[0])
-
-
 @pytest.mark.parametrize("fov", [0.1, 1.0, 40.0, 80.0, 150.0, 179.0])
 def test_the_cone_is_the_naive_formula(fov):
     light = Spotlight((0, 0, 0), (1, 2, -3), fov)

@@ -13,7 +13,7 @@ from small_scenes import room
 
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.motion import CameraMotion, KeyframedSpotlight, LissajousMotion, ModelMotion, spline
+from deferred_ir.scene.motion import CameraMotion, KeyframedSpotlight, LissajousMotion, ModelMotion, evaluate_spline
 
 TIMES = (0.0, 0.5, 2.0, 3.0)
 POSITIONS = ((0.0, 0.0, 0.0), (1.0, -1.0, 0.5), (2.0, 0.0, 0.0), (0.0, 4.0, 1.0))
@@ -42,20 +42,20 @@ def test_keyframes_hit_the_keys():
 
 def test_the_path_is_smooth_between_the_keys():
     """First and second differences stay small across a key: a spline, not a polyline."""
-    at = np.array([spline(TIMES, POSITIONS, t) for t in (0.5 - 1e-4, 0.5, 0.5 + 1e-4)])
+    at = np.array([evaluate_spline(TIMES, POSITIONS, t) for t in (0.5 - 1e-4, 0.5, 0.5 + 1e-4)])
     assert np.abs(np.diff(at, n=2, axis=0)).max() < 1e-6
     assert np.abs(np.diff(at, axis=0)).max() > 1e-5
 
 
 @pytest.mark.parametrize(("early", "late"), [(-1.0, 3.5), (-1e9, 1e9), (-math.inf, math.inf)])
 def test_the_path_rests_outside_its_times(early, late):
-    assert spline(TIMES, POSITIONS, early) == pytest.approx(POSITIONS[0])
-    assert spline(TIMES, POSITIONS, late) == pytest.approx(POSITIONS[-1])
+    assert evaluate_spline(TIMES, POSITIONS, early) == pytest.approx(POSITIONS[0])
+    assert evaluate_spline(TIMES, POSITIONS, late) == pytest.approx(POSITIONS[-1])
 
 
 def test_one_and_two_keys():
-    assert spline((4.0,), (POSITIONS[1],), 9.0) == POSITIONS[1]
-    assert spline((0.0, 2.0), POSITIONS[:2], 1.0) == pytest.approx((0.5, -0.5, 0.25))
+    assert evaluate_spline((4.0,), (POSITIONS[1],), 9.0) == POSITIONS[1]
+    assert evaluate_spline((0.0, 2.0), POSITIONS[:2], 1.0) == pytest.approx((0.5, -0.5, 0.25))
 
 
 def turn(degrees: float) -> tuple[float, float, float, float]:

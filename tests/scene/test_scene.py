@@ -58,7 +58,7 @@ def test_facts_say_whether_the_light_shines_and_how_many_triangles_there_are():
 
 
 def changed():
-    """Scenes that differ from `textured(room())` in one thing each, by name."""
+    """Return scenes that differ from `textured(room())` in one thing each, by name."""
     base = base_scene()
     g, light, camera = base.geometry, base.spotlight, base.camera
     moved = g.positions.copy()

@@ -1,4 +1,4 @@
-"""Sample patterns: in the unit square, repeatable, spread; and the disc that keeps areas."""
+"""Sample patterns lie in the unit square, are repeatable, and are spread evenly."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from scipy.stats import kstest, qmc
 
 from deferred_ir.sampling.patterns import PATTERNS, sample_unit_square
-from deferred_ir.sampling.warps import square_to_disc
 
 COUNTS = (0, 1, 2, 3, 5, 7, 16, 60, 64, 100, 255, 1000)
 
@@ -83,46 +82,3 @@ def test_sobol_points_are_stratified_in_each_elementary_interval(m):
     for k in range(m + 1):
         cells = np.floor(points * (2**k, 2 ** (m - k))).astype(int)
         assert len({tuple(cell) for cell in cells}) == 2**m
-
-
-# The disc
-
-
-def test_the_disc_is_filled_evenly():
-    points = square_to_disc(sample_unit_square("random", 1_000_000, 0))
-    radius, angle = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
-    assert radius.max() <= 1
-    assert radius.mean() == pytest.approx(2 / 3, rel=1e-3)
-    np.testing.assert_allclose(points.mean(axis=0), 0, atol=2e-3)
-    rings, _ = np.histogram(radius**2, bins=20, range=(0, 1))  # rings of equal area, the innermost included
-    np.testing.assert_allclose(rings / rings.mean(), 1, atol=0.02)
-    sectors, _ = np.histogram(angle, bins=24, range=(-np.pi, np.pi))
-    np.testing.assert_allclose(sectors / sectors.mean(), 1, atol=0.02)
-
-
-@given(st.floats(0.001, 0.999), st.floats(0.001, 0.999))
-def test_the_disc_map_preserves_area_everywhere(u, v):
-    """Its Jacobian is pi; differences taken on one side of the diagonals, where it has a kink."""
-    h = 1e-6
-    near_kink = abs(u - v) < 4 * h or abs(u + v - 1) < 4 * h
-    if near_kink:
-        return
-    p = square_to_disc(np.array([[u - h, v], [u + h, v], [u, v - h], [u, v + h]]))
-    du, dv = (p[1] - p[0]) / (2 * h), (p[3] - p[2]) / (2 * h)
-    assert abs(du[0] * dv[1] - du[1] * dv[0]) == pytest.approx(np.pi, rel=1e-4)
-
-
-def test_the_centre_and_the_corners_of_the_square():
-    points = square_to_disc(
-        np.array([[0.5, 0.5], [0, 0.5], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0], [1, 1], [1, 0], [0, 1]])
-    )
-    assert np.isfinite(points).all()
-    np.testing.assert_allclose(points[:5], [[0, 0], [-1, 0], [0, -1], [1, 0], [0, 1]], atol=1e-15)
-    np.testing.assert_allclose(np.hypot(*points[5:].T), 1)
-
-
-@given(st.tuples(st.floats(0, 1), st.floats(0, 1)))
-def test_neighbours_stay_neighbours(point):
-    step = np.array([[0, 0], [1e-5, 0], [0, 1e-5]])
-    p = square_to_disc(np.clip(np.array(point) * (1 - 1e-5) + step, 0, 1))
-    assert np.linalg.norm(p[1:] - p[0], axis=1).max() < 5e-5

@@ -12,7 +12,7 @@ import numpy as np
 from deferred_ir.base.errors import Error
 from deferred_ir.base.image_size import parse_size
 from deferred_ir.scene.scene import Scene
-from deferred_ir.truth.reference import reference
+from deferred_ir.truth.reference import trace_reference
 
 
 def _names(text: str) -> list[str]:
@@ -75,5 +75,5 @@ def read_or_trace(scene: Scene, chosen: argparse.Namespace) -> Mapping[str, Any]
     if chosen.reference:
         arrays: Mapping[str, Any] = np.load(chosen.reference)
         return arrays
-    traced = reference(scene, chosen.size, spp=chosen.spp)
+    traced = trace_reference(scene, chosen.size, spp=chosen.spp)
     return {"image": traced.radiance, "direct": traced.direct, "hit": traced.hit}

@@ -1,4 +1,4 @@
-"""Ray-traced references, by paths or by VPLs with perfect visibility, and what is known of their error."""
+"""Trace references, by paths or by VPLs with perfect visibility, and estimate their error."""
 
 from __future__ import annotations
 
@@ -26,13 +26,14 @@ from deferred_ir.vpls.cast import NONE, cast
 from deferred_ir.vpls.ray_sum import sum_radiance
 
 DEFAULT_SPP = 64
+"""Paths a pixel."""
 DISC_SAMPLES = 256
 """Points of a disc light for the direct light beside VPLs."""
 
 MOST_PIXELS = 1 << 24
 MOST_BOUNCES = 64
 SETTINGS = ("vpl.fov", "vpl.clamp", "vpl.pattern")
-"""What `settings` may hold; all belong to VPLs. The number of bounces is an argument of its own."""
+"""Keys that `settings` may have; all are about VPLs. The number of bounces is an argument of its own."""
 
 VPL_ERROR = "one set of VPLs cannot tell its own error, which all pixels share; compare several seeds"
 ONE_SAMPLE = "a single sample a pixel cannot tell its own error; take more"
@@ -40,10 +41,10 @@ ONE_SAMPLE = "a single sample a pixel cannot tell its own error; take more"
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """radiance, direct, indirect: float32 (H, W, 3), linear RGB, top row first; hit: bool (H, W).
+    """A reference: radiance, direct and indirect, float32 (H, W, 3), linear RGB, top row first as in image files.
 
-    standard_error: of each value of `radiance`, float32 (H, W, 3), or None where it cannot be told (`meta["note"]`
-    says why). meta: what OUT.json holds.
+    hit: where the camera ray hits a surface, bool (H, W). standard_error: that of each value of `radiance`, float32
+    (H, W, 3), or None if it is unknown (`meta["note"]` says why). meta: the content of OUT.json.
     """
 
     radiance: Array
@@ -61,7 +62,7 @@ class Reference:
         def fill(part: Path) -> None:
             with part.open("wb") as file:
                 np.save(file, self.radiance)
-            # Last before the image takes its name: so one is not there without the other.
+            # Written last before the image gets its name, so that neither file is there without the other.
             write_json(path.with_suffix(".json"), dict(self.meta))
 
         write_whole(path, fill)
@@ -75,7 +76,7 @@ def check_path(path: Path) -> None:
         check_folder(file)
 
 
-def reference(
+def trace_reference(
     scene: Scene,
     size: tuple[int, int],
     *,
@@ -88,33 +89,33 @@ def reference(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Reference:
-    """A ray-traced image of `scene` at `time` seconds, of `size` (width, height).
+    """Trace an image of `scene` at `time` seconds, of `size` (width, height).
 
-    spp: paths a pixel of the path tracer, 64 unless `vpls` is given: the number of VPLs, cast as in a render, with
-    ray-cast visibility. bounces: of indirect light, 0 for direct light alone. settings: {"vpl.param": value} for
-    VPLs, defaults as in a render. The same for any number of `threads` (None: all). progress: called with work done
-    and all work. Raises SettingError, DeviceError (no embreex).
+    spp: paths a pixel of the path tracer, 64 unless `vpls` is passed. vpls: the number of VPLs, cast as in a render,
+    with ray-cast visibility. bounces: those of indirect light, 0 for direct light alone. settings:
+    {"vpl.param": value} for VPLs, with the defaults of a render. The result does not depend on the number of `threads`
+    (None: all). progress: called with the work done and all work. Raises SettingError and DeviceError (no embreex).
     """
     settings = settings or {}
     _check(size, settings, spp=spp, vpls=vpls, bounces=bounces, seed=seed)
     start = clock.perf_counter()
-    tell: dict[str, Any] = {"scene": scene.name, "scene_hash": scene.hash, "size": list(size), "bounces": bounces}
-    tell["time"] = time if scene.moves else 0.0
+    meta: dict[str, Any] = {"scene": scene.name, "scene_hash": scene.hash, "size": list(size), "bounces": bounces}
+    meta["time"] = time if scene.moves else 0.0
     scene = recentre(scene.at(time))
     paths = PathTracer(scene, Tracer(scene), bounces)
     if vpls is None:
         spp = DEFAULT_SPP if spp is None else spp
-        made = _by_paths(paths, size, spp, seed=seed, threads=threads, progress=progress)
-        tell |= {"spp": spp, "seed": seed, "settings": {}}
+        traced = _trace_paths(paths, size, spp, seed=seed, threads=threads, progress=progress)
+        meta |= {"spp": spp, "seed": seed, "settings": {}}
     else:
-        params = vpl_params({**settings, "vpl.count": vpls, "vpl.bounces": max(bounces, 1)})
-        made = _by_vpls(paths, size, params, seed=seed, threads=threads, progress=progress)
-        tell |= {"vpls": vpls, "seed": seed, "settings": {name: getattr(params, name[4:]) for name in SETTINGS}}
-    broken = int((~np.isfinite(made.radiance)).any(axis=-1).sum())
+        params = make_vpl_params({**settings, "vpl.count": vpls, "vpl.bounces": max(bounces, 1)})
+        traced = _sum_vpls(paths, size, params, seed=seed, threads=threads, progress=progress)
+        meta |= {"vpls": vpls, "seed": seed, "settings": {name: getattr(params, name[4:]) for name in SETTINGS}}
+    broken = int((~np.isfinite(traced.radiance)).any(axis=-1).sum())
     if broken:
         raise OutputError(f"{scene.path}: {broken} pixels of the reference are not finite; look for extreme numbers")
-    tell["hit_fraction"] = float(made.hit.mean())
-    return replace(made, meta={**tell, **made.meta, "seconds": round(clock.perf_counter() - start, 3)})
+    meta["hit_fraction"] = float(traced.hit.mean())
+    return replace(traced, meta={**meta, **traced.meta, "seconds": round(clock.perf_counter() - start, 3)})
 
 
 def _check(
@@ -138,7 +139,7 @@ def _check(
         raise SettingError(f"set {min(settings)}: belongs to VPLs, and paths have none; give --vpls N, or leave it out")
 
 
-def vpl_params(settings: Mapping[str, Any]) -> CastParams:
+def make_vpl_params(settings: Mapping[str, Any]) -> CastParams:
     """Return the parameters of VPLs with the defaults of a render and `settings` on top; cones may open to 180 degrees.
 
     Shadow maps end a little short of the hemisphere, rays do not.
@@ -154,29 +155,29 @@ def vpl_params(settings: Mapping[str, Any]) -> CastParams:
     return replace(params, fov=180.0) if whole else params
 
 
-def _by_paths(
+def _trace_paths(
     paths: PathTracer, size: tuple[int, int], spp: int, *, seed: int, threads: int | None, progress: Progress | None
 ) -> Reference:
-    found = paths.estimate(size, spp, seed, threads, progress)
-    radiance = found.direct + found.indirect
-    told: dict[str, Any] = {"standard_error": None, "noise": None, "note": ONE_SAMPLE}
-    if found.variance is not None:
-        told = errors(radiance, found.variance, found.hit)
+    estimate = paths.estimate(size, spp, seed, threads, progress)
+    radiance = estimate.direct + estimate.indirect
+    error: dict[str, Any] = {"standard_error": None, "noise": None, "note": ONE_SAMPLE}
+    if estimate.variance is not None:
+        error = estimate_errors(radiance, estimate.variance, estimate.hit)
     return Reference(
         radiance.astype(np.float32),
-        found.direct.astype(np.float32),
-        found.indirect.astype(np.float32),
-        found.hit,
-        None if found.variance is None else np.sqrt(found.variance).astype(np.float32),
-        told,
+        estimate.direct.astype(np.float32),
+        estimate.indirect.astype(np.float32),
+        estimate.hit,
+        None if estimate.variance is None else np.sqrt(estimate.variance).astype(np.float32),
+        error,
     )
 
 
-def errors(radiance: Array, variance: Array, hit: Bools) -> dict[str, float]:
-    """What an image (H, W, 3) knows of its own error, over the pixels that are `hit`.
+def estimate_errors(radiance: Array, variance: Array, hit: Bools) -> dict[str, float]:
+    """Estimate the error of an image (H, W, 3) from the variance of its values, over the pixels that are `hit`.
 
-    standard_error: the mean standard error of a value, over the mean radiance. noise: the relMSE (untrimmed) against
-    the exact image that is to be expected.
+    Returns standard_error, the mean standard error of a value over the mean radiance, and noise, the (untrimmed) relMSE
+    to expect against the exact image.
     """
     mean = float(radiance[hit].mean()) if hit.any() else 0.0
     if mean == 0:
@@ -185,21 +186,21 @@ def errors(radiance: Array, variance: Array, hit: Bools) -> dict[str, float]:
     return {"standard_error": float(np.sqrt(variance[hit]).mean() / mean), "noise": float(relative.mean())}
 
 
-def _by_vpls(
+def _sum_vpls(
     paths: PathTracer, size: tuple[int, int], params: Any, *, seed: int, threads: int | None, progress: Progress | None
 ) -> Reference:
     scene, tracer, bounces = paths.scene, paths.tracer, paths.bounces
     seen = paths.trace_camera_rays(size)
     direct = paths.estimate_direct(size, DISC_SAMPLES, seed, threads)
-    shines = bounces > 0 and any(scene.spotlight.emission)
-    lights = cast(scene.spotlight, tracer, params.count, params.pattern, seed, bounces=bounces) if shines else NONE
+    emits = bounces > 0 and any(scene.spotlight.emission)
+    vpls = cast(scene.spotlight, tracer, params.count, params.pattern, seed, bounces=bounces) if emits else NONE
     limits = params.limits(scene.geometry.diagonal)
-    indirect = sum_radiance(tracer, seen, lights, limits, threads=threads, progress=progress).reshape(direct.shape)
+    indirect = sum_radiance(tracer, seen, vpls, limits, threads=threads, progress=progress).reshape(direct.shape)
     return Reference(
         (direct + indirect).astype(np.float32),
         direct.astype(np.float32),
         indirect.astype(np.float32),
         seen.hit.reshape(direct.shape[:2]),
         None,
-        {"vpls_alive": len(lights), "standard_error": None, "noise": None, "note": VPL_ERROR},
+        {"vpls_alive": len(vpls), "standard_error": None, "noise": None, "note": VPL_ERROR},
     )

@@ -11,7 +11,7 @@ from typing import Any
 from deferred_ir.base.errors import Error, SettingError
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
-from deferred_ir.truth.reference import Reference, reference
+from deferred_ir.truth.reference import Reference, trace_reference
 
 PERIOD = 0.5
 """Least seconds between two measurements of a picture that changes."""
@@ -55,7 +55,7 @@ class ReferenceJob:
 
         try:
             threads = max((os.cpu_count() or 2) - 1, 1)
-            self.result = reference(scene, size, spp=spp, bounces=bounces, threads=threads, progress=advance)
+            self.result = trace_reference(scene, size, spp=spp, bounces=bounces, threads=threads, progress=advance)
         except _Cancelled:
             return
         except Error as error:

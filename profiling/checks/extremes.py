@@ -20,7 +20,7 @@ from deferred_ir.base.errors import Error
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.profiling.checks.change_views import freeze, same
 from deferred_ir.scene.scene import Scene
-from deferred_ir.truth.reference import SETTINGS, Reference, reference
+from deferred_ir.truth.reference import SETTINGS, Reference, trace_reference
 
 UNSHADOWED = Path(__file__).with_name("unshadowed.toml")
 SIZE = (128, 128)
@@ -144,7 +144,7 @@ class Judge:
         """Sum the same VPLs with visibility by rays."""
         bounces = case.settings.get("vpl.bounces", 1) if case.vpls else 0
         settings = {name: value for name, value in self._values(case).items() if name in SETTINGS}
-        return reference(scene, case.size, vpls=max(case.vpls, 1), bounces=bounces, settings=settings)
+        return trace_reference(scene, case.size, vpls=max(case.vpls, 1), bounces=bounces, settings=settings)
 
     def _render_unshadowed(self, scene: Scene, case: Case) -> Array:
         """Render with the same lights and without shadows."""

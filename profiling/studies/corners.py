@@ -17,7 +17,7 @@ from deferred_ir.loading.load import load
 from deferred_ir.profiling.figures import picture_panels
 from deferred_ir.profiling.study import command_line, run
 from deferred_ir.truth.metrics import relmse
-from deferred_ir.truth.reference import reference
+from deferred_ir.truth.reference import trace_reference
 
 SIZE = 256, 256
 CROP = slice(150, 250), slice(60, 190)
@@ -32,7 +32,7 @@ def report(chosen: argparse.Namespace) -> None:
     for name, graph in (("clamped", "interleaved"), ("residual added back", "accurate")):
         with Renderer(SIZE, graph, set=SETTINGS) as renderer:
             images[name] = renderer.render(scene, vpls=VPLS, accumulate=FRAMES).radiance
-    images["ray-traced"] = reference(scene, SIZE, spp=SPP).radiance
+    images["ray-traced"] = trace_reference(scene, SIZE, spp=SPP).radiance
     crops = {name: image[CROP] for name, image in images.items()}
     white = float(np.quantile(crops["ray-traced"], 0.9))
     picture_panels(crops, white, chosen.output / "corners.svg")

@@ -30,7 +30,7 @@ from deferred_ir.profiling.study import command_line, run
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
-from deferred_ir.truth.reference import reference
+from deferred_ir.truth.reference import trace_reference
 
 VPLS = 256
 MOST = 8
@@ -93,7 +93,7 @@ def times(scene: Scene, size: tuple[int, int]) -> dict[str, Any]:
 def errors(scene: Scene, size: tuple[int, int]) -> dict[str, float]:
     """Return the relMSE of a still light against paths: of a full retained set and of a fresh one."""
     scene = hold_light(scene)
-    truth = reference(scene, size, spp=PATHS).radiance
+    truth = trace_reference(scene, size, spp=PATHS).radiance
     values = dict[str, list[float]](retained=[], sobol=[])
     with Renderer(size, "incremental") as retained, Renderer(size, "interleaved") as fresh:
         plan = retained.plan(scene, VPLS)

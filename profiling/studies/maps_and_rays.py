@@ -20,7 +20,7 @@ from deferred_ir.profiling.figures import markdown
 from deferred_ir.profiling.study import command_line, read_or_trace, run
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
-from deferred_ir.truth.reference import reference
+from deferred_ir.truth.reference import trace_reference
 
 HEAD = (
     *("scene", "graph", "relMSE with maps", "relMSE with rays", "maps / rays"),
@@ -40,7 +40,7 @@ def measure(
         for seed in track(range(seeds), scene.name):
             renderer.draw(scene, plan, seed=seed)
             mapped = renderer.read(plan).radiance
-            traced = reference(scene, size, vpls=vpls, seed=seed, settings=cone)
+            traced = trace_reference(scene, size, vpls=vpls, seed=seed, settings=cone)
             maps.append(relmse(mapped, image, hit)[0])
             rays.append(relmse(traced.radiance, image, hit)[0])
             ratios.append((mapped - direct)[hit].mean() / traced.indirect[hit].mean())

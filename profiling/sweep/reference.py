@@ -18,7 +18,7 @@ from deferred_ir.output.image import read_radiance
 from deferred_ir.output.metadata import metadata_path, read_metadata
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
-from deferred_ir.truth.reference import reference
+from deferred_ir.truth.reference import trace_reference
 
 FILE = "reference.npy"
 FIRST_SPP, MOST_SPP = 256, 4096
@@ -116,7 +116,7 @@ def load_or_trace(
 
 def _trace(scene: Scene, size: tuple[int, int], spp: int, bounces: int, *, seed: int, bar: ProgressBar) -> Truth:
     bar.label(f"reference, {spp} paths")
-    traced = reference(scene, size, spp=spp, bounces=bounces, seed=seed, progress=bar.show)
+    traced = trace_reference(scene, size, spp=spp, bounces=bounces, seed=seed, progress=bar.show)
     return Truth(traced.radiance, traced.meta)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from deferred_ir.cli.main import main
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.truth.reference import vpl_params
+from deferred_ir.truth.reference import make_vpl_params
 
 
 @pytest.mark.parametrize("kind", ["paths", "vpls"])
@@ -32,7 +32,7 @@ def test_the_command_writes_the_image_and_its_record(kind, tmp_path, capsys):
         assert 0 < record["noise"] < 1
         assert "vpls" not in record
     else:
-        assert record["settings"] == {"vpl.fov": 180.0, "vpl.clamp": vpl_params({}).clamp, "vpl.pattern": "random"}
+        assert record["settings"] == {"vpl.fov": 180.0, "vpl.clamp": make_vpl_params({}).clamp, "vpl.pattern": "random"}
         assert (record["vpls"], record["standard_error"], record["noise"]) == (16, None, None)
         assert "seeds" in record["note"]
         assert "spp" not in record

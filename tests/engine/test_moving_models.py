@@ -33,7 +33,7 @@ from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.motion import ModelMotion
 from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
-from deferred_ir.truth.reference import reference
+from deferred_ir.truth.reference import trace_reference
 
 SIZE = (48, 32)
 # Geometry
@@ -190,7 +190,7 @@ def test_maps_show_what_moves_where_it_is(renderer, graph, options, tolerance):
 
 def test_a_reference_is_of_the_moved_scene():
     scene = room_with_moving_models()
-    now, made = reference(scene.at(0.7), SIZE, spp=4), reference(bake(scene, 0.7), SIZE, spp=4)
+    now, made = trace_reference(scene.at(0.7), SIZE, spp=4), trace_reference(bake(scene, 0.7), SIZE, spp=4)
     np.testing.assert_allclose(now.radiance, made.radiance, atol=1e-4 * made.radiance.max())
 
 

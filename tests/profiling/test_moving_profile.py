@@ -14,7 +14,7 @@ from deferred_ir.engine.renderer import Renderer
 from deferred_ir.profiling.sweep import sweep
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.truth.metrics import relmse
-from deferred_ir.truth.reference import reference
+from deferred_ir.truth.reference import trace_reference
 
 SIZE = (24, 24)
 SMALL = ["--size", "24x24"]
@@ -54,11 +54,11 @@ def test_a_reference_of_a_time(scene_file, tmp_path, capsys):
         made[time] = np.load(out)
         assert json.loads(out.with_suffix(".json").read_text())["time"] == float(time)
     assert not np.array_equal(made["0"], made["0.3"])
-    np.testing.assert_array_equal(made["0.3"], reference(load(scene_file), SIZE, spp=4, time=0.3).radiance)
+    np.testing.assert_array_equal(made["0.3"], trace_reference(load(scene_file), SIZE, spp=4, time=0.3).radiance)
 
 
 def test_a_still_scene_is_of_no_time():
-    assert reference(load("cornell"), (4, 4), spp=1, time=5.0).meta["time"] == 0.0
+    assert trace_reference(load("cornell"), (4, 4), spp=1, time=5.0).meta["time"] == 0.0
 
 
 def test_images_of_other_times_are_not_compared(scene_file, tmp_path, capsys):

@@ -171,7 +171,7 @@ def test_the_page_stands_alone(whole):
 
 def test_a_finished_sweep_measures_nothing_again(copied, measured, monkeypatch):
     before = {name: (copied / name).read_bytes() for name in FILES | MASK | {"reference.npy"}}
-    monkeypatch.setattr(sweep_reference, "reference", None)  # would fail if it were called
+    monkeypatch.setattr(sweep_reference, "trace_reference", None)  # would fail if it were called
     assert profile(copied) == 0
     assert not measured
     assert {name: (copied / name).read_bytes() for name in before} == before

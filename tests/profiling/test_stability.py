@@ -12,7 +12,7 @@ from small_scenes import box, build, room
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.recentre import recentre_geometry
 from deferred_ir.scene.scene import Scene
-from deferred_ir.truth.reference import reference
+from deferred_ir.truth.reference import trace_reference
 
 
 @pytest.mark.parametrize("graph", ["deferred", "hemisphere", "accurate"])
@@ -71,7 +71,7 @@ def test_a_spotlight_in_a_wall_shines(renderer, fov: float) -> None:
         light = Spotlight(tuple(at), tuple(below), fov, (3.0, 2.0, 1.0))
         scene = build(replace(walls, positions=walls.positions @ turn.T), camera=camera, spotlight=light)
         found = one.render(scene).radiance
-        wanted = reference(scene, (32, 32), bounces=0).radiance
+        wanted = trace_reference(scene, (32, 32), bounces=0).radiance
         assert np.abs(found - wanted).mean() < 0.02 * wanted.mean()
 
 
@@ -98,7 +98,7 @@ def test_a_giant_triangle_spoils_nothing(renderer, times: float) -> None:
     wanted = one.render(giant(room(), 8.0)).radiance
     found = one.render(giant(room(), times)).radiance
     assert np.abs(found - wanted).mean() < 2e-3 * wanted.mean()
-    traced = reference(giant(room(), times), (64, 64), vpls=8, settings={"vpl.clamp": 0.0}).radiance
+    traced = trace_reference(giant(room(), times), (64, 64), vpls=8, settings={"vpl.clamp": 0.0}).radiance
     assert np.abs(traced - wanted).mean() < 0.03 * wanted.mean()
 
 

@@ -15,7 +15,7 @@ from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.motion import CameraMotion
 from deferred_ir.scene.recentre import recentre
 from deferred_ir.truth.metrics import relmse
-from deferred_ir.truth.reference import reference
+from deferred_ir.truth.reference import trace_reference
 
 
 def test_a_scene_near_the_origin_stays_as_it_is() -> None:
@@ -45,7 +45,7 @@ def test_a_picture_is_the_same_far_from_the_origin(renderer, graph: str) -> None
 
 def test_a_reference_is_the_same_far_from_the_origin() -> None:
     scene = load("cornell")
-    near, far = (reference(each, (32, 32), vpls=8).radiance for each in (scene, move_away(scene)))
+    near, far = (trace_reference(each, (32, 32), vpls=8).radiance for each in (scene, move_away(scene)))
     assert relmse(far, near)[0] < 1e-5
 
 

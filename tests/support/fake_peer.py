@@ -8,7 +8,7 @@ import numpy as np
 
 from deferred_ir.base.errors import SettingError
 from deferred_ir.profiling.peers.peer import Rendered
-from deferred_ir.truth.reference import reference
+from deferred_ir.truth.reference import trace_reference
 
 INSTALL = "fake-renderer"
 ABORTS, RAISES, HANGS = 1001, 1002, 1003
@@ -36,5 +36,5 @@ class Peer:
             raise RuntimeError("out of\nluck")
         if spp == HANGS:
             time.sleep(600)
-        image = reference(self.scene, self.size, spp=spp, bounces=self.bounces, seed=seed + 1)
+        image = trace_reference(self.scene, self.size, spp=spp, bounces=self.bounces, seed=seed + 1)
         return Rendered(image.radiance.astype(np.float32), 10.0 * spp)

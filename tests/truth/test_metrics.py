@@ -1,4 +1,4 @@
-"""Distance between images: the definitions, written out again, and rules that hold for all images."""
+"""Distances between images: their definitions, written out again, and rules that hold for all images."""
 
 import json
 import subprocess
@@ -18,43 +18,43 @@ from deferred_ir.truth.flip import FlipParameters
 IMAGES = arrays(np.float32, (5, 7, 3), elements=st.floats(0, 1000, width=32)).filter(lambda image: image.max() > 0.01)
 
 
-def pictures(seed=0, shape=(40, 50)):
+def make_pictures(seed=0, shape=(40, 50)):
     rng = np.random.default_rng(seed)
     reference = rng.gamma(1.0, 1.0, (*shape, 3)).astype(np.float32)
     return reference * rng.normal(1, 0.2, (*shape, 3)).clip(0).astype(np.float32), reference
 
 
-def by_definition(image, reference, hit):
-    """relMSE as the contract words it."""
+def relmse_by_definition(image, reference, hit):
+    """Return relMSE as docs/metrics.md defines it."""
     image, reference = image.astype(float), reference.astype(float)
     error = ((image - reference) ** 2 / (reference**2 + 0.01 * reference[hit].mean() ** 2)).mean(-1)[hit]
     return np.sort(error)[: int(len(error) * 0.999)].mean(), error.mean()
 
 
 def test_relmse_is_the_contracts():
-    image, reference = pictures()
+    image, reference = make_pictures()
     hit = np.random.default_rng(1).random(reference.shape[:2]) < 0.7
-    assert metrics.relmse(image, reference, hit) == pytest.approx(by_definition(image, reference, hit))
+    assert metrics.relmse(image, reference, hit) == pytest.approx(relmse_by_definition(image, reference, hit))
 
 
-def test_background_does_not_count_however_it_is_told():
-    image, reference = pictures()
+def test_background_does_not_count_however_it_is_marked():
+    image, reference = make_pictures()
     hit = np.random.default_rng(1).random(reference.shape[:2]) < 0.7
     image[~hit] = reference[~hit] = 0
-    wanted = by_definition(image, reference, hit)
+    wanted = relmse_by_definition(image, reference, hit)
     for told in (hit, float(hit.mean()), None):
         assert metrics.relmse(image, reference, told) == pytest.approx(wanted)
 
 
 def test_dark_surfaces_count_when_the_share_of_hits_is_known():
-    image, reference = pictures()
+    image, reference = make_pictures()
     image[:10] = reference[:10] = 0  # surfaces that no light reaches
     everywhere = np.ones(reference.shape[:2], bool)
-    assert metrics.relmse(image, reference, 1.0) == pytest.approx(by_definition(image, reference, everywhere))
+    assert metrics.relmse(image, reference, 1.0) == pytest.approx(relmse_by_definition(image, reference, everywhere))
 
 
 def test_bias_is_signed_and_rmse_absolute():
-    _, reference = pictures()
+    _, reference = make_pictures()
     assert metrics.bias(0.9 * reference, reference) == pytest.approx(-0.1, abs=1e-6)
     assert metrics.bias(1.2 * reference, reference) == pytest.approx(0.2, abs=1e-6)
     assert metrics.rmse(reference + 0.5, reference) == pytest.approx(0.5, abs=1e-6)
@@ -112,7 +112,7 @@ def test_what_is_not_finite_is_refused_by_name_and_count(broken, as_reference):
         (np.ones((0, 4, 3)), np.zeros((0, 4, 3)), "has the shape"),
     ],
 )
-def test_what_cannot_be_measured_is_told(image, reference, words):
+def test_what_cannot_be_measured_is_refused(image, reference, words):
     with pytest.raises(SettingError, match=words):
         metrics.compare(image, reference)
 
@@ -141,7 +141,7 @@ def test_radiance_of_any_float_type_is_taken_but_none_that_32_bits_cannot_hold()
 
 
 def test_an_image_that_is_lit_where_the_reference_has_background_is_not_flattered():
-    image, reference = pictures()
+    image, reference = make_pictures()
     reference[:20] = 0
     trimmed, whole = metrics.relmse(image, reference, 0.5)
     assert trimmed <= whole
@@ -150,17 +150,17 @@ def test_an_image_that_is_lit_where_the_reference_has_background_is_not_flattere
 
 
 def test_figures_are_plain_data():
-    image, reference = pictures()
+    image, reference = make_pictures()
     assert json.loads(json.dumps(metrics.compare(image, reference).as_dict()))["size"] == [50, 40]
 
 
 def test_flip_of_an_image_with_itself_is_nothing():
-    _, reference = pictures()
+    _, reference = make_pictures()
     assert metrics.compare(reference, reference).flip == pytest.approx(0, abs=1e-6)
 
 
 def test_flip_is_what_its_package_says_of_an_image_without_black():
-    image, reference = pictures(shape=(64, 64))
+    image, reference = make_pictures(shape=(64, 64))
     _, value, used = flip_evaluator.evaluate(reference, image, "HDR", applyMagma=False)
     result = metrics.compare(image, reference)
     assert result.flip == pytest.approx(value, abs=1e-5)
@@ -171,7 +171,7 @@ def test_flip_is_what_its_package_says_of_an_image_without_black():
 
 
 def test_flip_keeps_its_exposures_where_most_of_the_reference_is_background():
-    image, reference = pictures(shape=(64, 64))
+    image, reference = make_pictures(shape=(64, 64))
     parameters = FlipParameters.from_reference(reference[:16])
     image[16:] = reference[16:] = 0
     result = metrics.compare(image, reference)
@@ -181,13 +181,13 @@ def test_flip_keeps_its_exposures_where_most_of_the_reference_is_background():
 
 @pytest.mark.parametrize("scale", [1e-30, 1e-20, 1e20, 1e30])
 def test_flip_does_not_depend_on_the_unit_of_radiance(scale):
-    image, reference = (array.astype(float) for array in pictures())
+    image, reference = (array.astype(float) for array in make_pictures())
     plain = metrics.compare(image, reference).flip
     assert metrics.compare(image * scale, reference * scale).flip == pytest.approx(plain, abs=1e-4)
 
 
 def test_flip_takes_a_firefly_and_any_range_for_what_they_are():
-    _, reference = pictures()
+    _, reference = make_pictures()
     firefly = reference.copy()
     firefly[5, 6] = 3e38
     parameters = FlipParameters.from_reference(reference)
@@ -216,11 +216,11 @@ def test_the_flip_package_cannot_end_the_program(monkeypatch):
 
     monkeypatch.setattr(flip_evaluator, "evaluate", leave)
     with pytest.raises(SettingError, match="flip-evaluator refuses"):
-        metrics.compare(*pictures())
+        metrics.compare(*make_pictures())
 
 
 def test_flip_sees_what_is_there_and_its_exposures_stay_fixed_in_a_sweep():
-    image, reference = pictures(shape=(64, 64))
+    image, reference = make_pictures(shape=(64, 64))
     parameters = FlipParameters.from_reference(reference)
     near = metrics.compare(0.5 * image + 0.5 * reference, reference, flip_parameters=parameters)
     far = metrics.compare(image, reference, flip_parameters=parameters)
@@ -230,7 +230,7 @@ def test_flip_sees_what_is_there_and_its_exposures_stay_fixed_in_a_sweep():
 
 
 def test_flip_is_left_out_where_it_has_no_meaning_and_says_why():
-    image, reference = pictures()
+    image, reference = make_pictures()
     image[3, 4] = -0.5
     result = metrics.compare(image, reference)
     assert result.flip is None

@@ -13,25 +13,25 @@ from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.truth.path_tracer import PathTracer
-from deferred_ir.truth.reference import errors, reference, vpl_params
+from deferred_ir.truth.reference import estimate_errors, make_vpl_params, trace_reference
 
 ABOVE = Camera((0.0, 3.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -1.0), fov=30.0)
 UNCLAMPED = {"vpl.clamp": 0.0, "vpl.fov": 180}
 
 
-def paths(scene, **options):
+def make_path_tracer(scene, **options):
     return PathTracer(scene, Tracer(scene), **options)
 
 
-def points_below(size, height=3.0, fov=30.0):
-    """Where the pixels of ABOVE meet y = 0: x and z, each (H, W)."""
+def find_floor_points(size, height=3.0, fov=30.0):
+    """Return where the pixels of ABOVE meet y = 0: x and z, (H, W) each."""
     half = height * np.tan(np.radians(fov) / 2)
     x = ((np.arange(size) + 0.5) / size * 2 - 1) * half
     return np.meshgrid(x, x)
 
 
-def spotlight_irradiance(source, look_at, fov, emission, points):
-    """E cos(theta) cone(theta) cos_x / d^2 on the floor y = 0, straight from the contract. points: (..., 3)."""
+def compute_irradiance(source, look_at, fov, emission, points):
+    """Return E cos(theta) cone(theta) cos_x / d^2 at points (..., 3) of the floor y = 0, by docs/conventions.md."""
     axis = np.subtract(look_at, source) / np.linalg.norm(np.subtract(look_at, source))
     way = points - source
     distance = np.linalg.norm(way, axis=-1)
@@ -42,7 +42,7 @@ def spotlight_irradiance(source, look_at, fov, emission, points):
     return emission * (np.maximum(cosine, 0) * cone * facing / distance**2)[..., None]
 
 
-def block_means(values, side):
+def average_blocks(values, side):
     height, width, channels = values.shape
     return values.reshape(height // side, side, width // side, side, channels).mean(axis=(1, 3))
 
@@ -56,10 +56,10 @@ def lit_floor():
 @pytest.mark.parametrize("kind", [{"spp": 1}, {"vpls": 4}])
 def test_direct_light_on_a_plane_is_the_closed_form(lit_floor, kind):
     light = lit_floor.spotlight
-    made = reference(lit_floor, (32, 32), **kind)
-    x, z = points_below(32)
+    made = trace_reference(lit_floor, (32, 32), **kind)
+    x, z = find_floor_points(32)
     points = np.stack([x, np.zeros_like(x), z], axis=-1)
-    expected = spotlight_irradiance(light.position, light.look_at, light.fov, np.array(light.emission), points)
+    expected = compute_irradiance(light.position, light.look_at, light.fov, np.array(light.emission), points)
     np.testing.assert_allclose(
         made.direct, expected * (0.8, 0.5, 0.2) / np.pi, rtol=1e-5, atol=2e-6
     )  # hits in single precision
@@ -70,13 +70,13 @@ def test_direct_light_on_a_plane_is_the_closed_form(lit_floor, kind):
 
 def test_no_light_arrives_from_behind_a_surface(lit_floor):
     below = replace(lit_floor.spotlight, position=(0.3, -1.2, -0.2))
-    assert not reference(replace(lit_floor, spotlight=below), (8, 8), spp=4).radiance.any()
+    assert not trace_reference(replace(lit_floor, spotlight=below), (8, 8), spp=4).radiance.any()
 
 
 def test_a_blocker_casts_its_shadow(lit_floor):
     lid = quad((-2, 1.0, 2), (2, 1.0, 2), (2, 1.0, -2))
     scene = build(plane(), lid, camera=replace(ABOVE, position=(0.0, 0.9, 0.0)), spotlight=lit_floor.spotlight)
-    assert not reference(scene, (8, 8), spp=1, bounces=0).radiance.any()
+    assert not trace_reference(scene, (8, 8), spp=1, bounces=0).radiance.any()
 
 
 def test_a_disc_light_is_the_mean_of_its_points():
@@ -98,7 +98,7 @@ def test_a_disc_light_is_the_mean_of_its_points():
             source = np.array([0.2 + r * np.cos(a), 1.0, r * np.sin(a)])
             crossing = source[0] + (at[..., 0] - source[0]) * 0.5  # x halfway down, where the edge is
             seen = np.where(crossing < 0.2, 1.0, 0.0)[..., None]
-            expected += spotlight_irradiance(source, source - (0, 1, 0), 120.0, np.full(3, 2.0), at) * seen
+            expected += compute_irradiance(source, source - (0, 1, 0), 120.0, np.full(3, 2.0), at) * seen
     expected *= 0.5 / np.pi / steps**2
     penumbra = on_floor & (at[..., 0] > -0.15) & (at[..., 0] < 0.55)
     assert penumbra.sum() > 30
@@ -110,15 +110,15 @@ def test_a_disc_light_is_the_mean_of_its_points():
     assert np.sqrt(estimate.variance[penumbra]).mean() > 0
 
 
-def closed_sphere(albedo, radius=1.5):
-    """Seen and lit from inside, close to the middle."""
+def make_sphere_scene(albedo, radius=1.5):
+    """Return a sphere that is seen and lit from inside, close to the middle."""
     camera = Camera((0.0, 0.1, 0.0), (0.5, 0.4, -1.0), fov=90.0)
     light = Spotlight((0.05, 0.0, 0.0), (1.0, 0.1, 0.0), 110.0, (3.0, 2.0, 1.0))
     return build(sphere(radius, 5, (albedo,) * 3), camera=camera, spotlight=light)
 
 
-def sphere_bounce(scene, radius=1.5):
-    """Radiance of the first bounce inside a sphere: the light's power, spread evenly, times albedo, twice over pi."""
+def compute_first_bounce(scene, radius=1.5):
+    """Return the first bounce's radiance inside a sphere: the power, spread evenly, times albedo, twice over pi."""
     light, rho = scene.spotlight, scene.materials[0].albedo[0]
     edge = np.cos(np.radians(light.fov / 2))
     cosine = np.linspace(edge, 1, 200001)
@@ -128,31 +128,31 @@ def sphere_bounce(scene, radius=1.5):
 
 
 def test_the_first_bounce_inside_a_sphere_is_constant():
-    scene = closed_sphere(0.6)
-    expected = sphere_bounce(scene)
-    made = reference(scene, (16, 16), vpls=1024, settings=UNCLAMPED)
+    scene = make_sphere_scene(0.6)
+    expected = compute_first_bounce(scene)
+    made = trace_reference(scene, (16, 16), vpls=1024, settings=UNCLAMPED)
     np.testing.assert_allclose(made.indirect / expected, 1, rtol=0.01)
     assert (made.indirect / expected).mean() == pytest.approx(1, rel=3e-3)
 
 
 @pytest.mark.parametrize("bounces", [1, 2, 4])
 def test_bounces_inside_a_sphere_are_the_geometric_series(bounces):
-    scene, rho = closed_sphere(0.6), 0.6
-    expected = sphere_bounce(scene) * sum(rho**k for k in range(bounces))
-    estimate = paths(scene, bounces=bounces).estimate((32, 32), 64)
+    scene, rho = make_sphere_scene(0.6), 0.6
+    expected = compute_first_bounce(scene) * sum(rho**k for k in range(bounces))
+    estimate = make_path_tracer(scene, bounces=bounces).estimate((32, 32), 64)
     assert estimate.hit.all()
     ratio = (estimate.indirect / expected).mean()
     sigma = np.sqrt((estimate.variance / expected**2).sum()) / estimate.variance.size
     # The channels of a pixel share their paths; the sphere's facets cost it 2e-3.
     assert abs(ratio - 1) < 3 * np.sqrt(3) * sigma + 2e-3
     assert sigma < 3e-3
-    by_vpls = reference(scene, (16, 16), vpls=1024, bounces=bounces, settings=UNCLAMPED).indirect / expected
+    by_vpls = trace_reference(scene, (16, 16), vpls=1024, bounces=bounces, settings=UNCLAMPED).indirect / expected
     assert by_vpls.mean() == pytest.approx(1, rel=1e-2)
 
 
 def test_without_bounces_only_direct_light_is_left():
     for kind in ({"spp": 4}, {"vpls": 4}):
-        made = reference(room(), (8, 8), bounces=0, **kind)
+        made = trace_reference(room(), (8, 8), bounces=0, **kind)
         assert not made.indirect.any()
         assert made.direct.any()
 
@@ -163,30 +163,30 @@ def test_without_bounces_only_direct_light_is_left():
     ids=["hemisphere", "clamped", "cone"],
 )
 def test_paths_and_vpls_agree(clamp, fov, smooth):
-    """Both estimate one integral by other means: block means of the indirect light, within their standard errors."""
+    """Both estimate one integral: block means of the indirect light agree within their standard errors."""
     scene = room()
     if smooth:
         ball = sphere(0.3, 3, (0.3, 0.6, 0.9))
         ball = Mesh(np.add(ball.positions, (0.4, -0.6, -0.4)), ball.faces, ball.albedo, ball.normals)
         scene = build(box((-1, -1, -1), (1, 1, 1)), ball, camera=scene.camera, spotlight=scene.spotlight)
     size, side, seeds = (32, 32), 8, 8
-    estimate = paths(scene, clamp=clamp, fov=fov).estimate(size, 256)
+    estimate = make_path_tracer(scene, clamp=clamp, fov=fov).estimate(size, 256)
     settings = {"vpl.clamp": clamp, "vpl.fov": fov}
-    sets = [reference(scene, size, vpls=512, seed=s, settings=settings).indirect for s in range(seeds)]
-    blocks = np.array([block_means(one.astype(float), side) for one in sets])
-    variance = blocks.var(axis=0, ddof=1) / seeds + block_means(estimate.variance, side) / side**2
-    off = (blocks.mean(axis=0) - block_means(estimate.indirect, side)) / np.sqrt(variance)
+    sets = [trace_reference(scene, size, vpls=512, seed=s, settings=settings).indirect for s in range(seeds)]
+    blocks = np.array([average_blocks(one.astype(float), side) for one in sets])
+    variance = blocks.var(axis=0, ddof=1) / seeds + average_blocks(estimate.variance, side) / side**2
+    off = (blocks.mean(axis=0) - average_blocks(estimate.indirect, side)) / np.sqrt(variance)
     assert (np.abs(off) < 3).mean() >= 0.97
     assert np.abs(off).max() < 6
-    mean = block_means(estimate.indirect, side).mean()
+    mean = average_blocks(estimate.indirect, side).mean()
     assert blocks.mean() == pytest.approx(mean, rel=0.01)
 
 
 def test_the_stated_error_is_the_error():
-    """The spread over seeds, and the noise against a far better image, are what one image says of itself."""
+    """The spread over seeds and the noise against a far better image are as one image states them."""
     scene = room()
-    tracer = paths(scene)
-    made = [reference(scene, (24, 24), spp=64, seed=seed) for seed in range(6)]
+    tracer = make_path_tracer(scene)
+    made = [trace_reference(scene, (24, 24), spp=64, seed=seed) for seed in range(6)]
     spread = np.var([one.radiance for one in made], axis=0, ddof=1).mean()
     stated = np.mean([one.standard_error**2 for one in made])
     assert spread == pytest.approx(stated, rel=0.1)
@@ -199,10 +199,10 @@ def test_the_stated_error_is_the_error():
 
 def test_errors_of_a_known_image():
     radiance, hit = np.full((2, 2, 3), 2.0), np.array([[True, True], [True, False]])
-    told = errors(radiance, np.full((2, 2, 3), 0.04), hit)
+    told = estimate_errors(radiance, np.full((2, 2, 3), 0.04), hit)
     assert told == pytest.approx({"standard_error": 0.1, "noise": 0.04 / 4.04})
-    assert errors(radiance * 0, radiance * 0, hit) == {"standard_error": 0, "noise": 0}
-    assert errors(radiance * 0, radiance * 0, hit & False) == {"standard_error": 0, "noise": 0}
+    assert estimate_errors(radiance * 0, radiance * 0, hit) == {"standard_error": 0, "noise": 0}
+    assert estimate_errors(radiance * 0, radiance * 0, hit & False) == {"standard_error": 0, "noise": 0}
 
 
 @pytest.mark.parametrize("kind", [{"spp": 8, "bounces": 2}, {"vpls": 100, "bounces": 2}])
@@ -210,18 +210,18 @@ def test_the_same_image_for_any_number_of_threads(kind, monkeypatch):
     monkeypatch.setattr("deferred_ir.truth.path_tracer.RAYS", 512)
     monkeypatch.setattr("deferred_ir.vpls.ray_sum.PIXELS", 100)
     scene = replace(room(), spotlight=replace(room().spotlight, radius=0.1))
-    images = [reference(scene, (24, 16), threads=threads, **kind).radiance for threads in (1, 2, 5)]
+    images = [trace_reference(scene, (24, 16), threads=threads, **kind).radiance for threads in (1, 2, 5)]
     np.testing.assert_array_equal(images[0], images[1])
     np.testing.assert_array_equal(images[0], images[2])
     assert images[0].shape == (16, 24, 3)
-    other = reference(scene, (24, 16), seed=1, **kind).radiance
+    other = trace_reference(scene, (24, 16), seed=1, **kind).radiance
     assert np.abs(other - images[0]).max() > 0
 
 
 @pytest.mark.parametrize("factor", [1e-3, 1e3, 1e8])
 @pytest.mark.parametrize("kind", [{"spp": 4}, {"vpls": 64}])
 def test_the_unit_of_length_does_not_matter(kind, factor):
-    one, other = (reference(scene, (16, 16), **kind).radiance for scene in (room(), scaled(room(), factor)))
+    one, other = (trace_reference(scene, (16, 16), **kind).radiance for scene in (room(), scaled(room(), factor)))
     # Rays in single precision: a few grazing ones decide otherwise.
     assert np.median(np.abs(other - one)) < 1e-4 * one.mean()
     assert other.mean() == pytest.approx(one.mean(), rel=0.01)
@@ -229,18 +229,18 @@ def test_the_unit_of_length_does_not_matter(kind, factor):
 
 def test_background_is_black_and_not_counted():
     scene = build(plane(0.2), camera=ABOVE)
-    made = reference(scene, (16, 16), spp=4)
+    made = trace_reference(scene, (16, 16), spp=4)
     assert not made.radiance[~made.hit].any()
     assert 0 < made.hit.mean() < 1
     away = replace(scene, camera=replace(ABOVE, position=(0, -3, 0), look_at=(0, -4, 0)))
     for kind in ({"spp": 4}, {"vpls": 4}):
-        assert not reference(away, (4, 4), **kind).radiance.any()
+        assert not trace_reference(away, (4, 4), **kind).radiance.any()
 
 
 def test_a_dark_light_gives_a_black_image():
     scene = replace(room(), spotlight=replace(room().spotlight, emission=(0.0, 0.0, 0.0)))
     for kind in ({"spp": 4}, {"vpls": 4}):
-        assert not reference(scene, (4, 4), **kind).radiance.any()
+        assert not trace_reference(scene, (4, 4), **kind).radiance.any()
 
 
 def test_the_path_tracer_shares_nothing_with_what_it_judges():
@@ -254,12 +254,12 @@ def test_the_path_tracer_shares_nothing_with_what_it_judges():
 
 
 def test_defaults_of_vpls_are_those_of_a_render():
-    params, default = load_graph("deferred").nodes["vpl"].work.params, vpl_params({})
+    params, default = load_graph("deferred").nodes["vpl"].work.params, make_vpl_params({})
     assert asdict(default).items() <= asdict(params).items()
-    assert vpl_params({"vpl.fov": 180}).fov == 180
+    assert make_vpl_params({"vpl.fov": 180}).fov == 180
 
 
 def test_a_library_call_is_checked_too():
     for bad in ({"spp": 1, "vpls": 1}, {"spp": 0}, {"vpls": -1}, {"bounces": -1}, {"vpls": 1, "settings": {"fov": 1}}):
         with pytest.raises(SettingError):
-            reference(room(), (4, 4), **bad)
+            trace_reference(room(), (4, 4), **bad)

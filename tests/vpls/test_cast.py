@@ -1,4 +1,4 @@
-"""Casting VPLs: where they lie, and that their emission adds up to what the light sends out."""
+"""Casting VPLs: where they lie, and that their emission adds up to the light's power."""
 
 from __future__ import annotations
 
@@ -178,14 +178,14 @@ def test_rays_on_the_very_rim_of_a_half_space_are_fine(monkeypatch):
 # More bounces
 
 
-def by_bounce(lights: vpls.Vpls, count: int) -> list[np.ndarray]:
-    """The summed emission of each bounce: `ray` starts anew with each."""
+def sum_bounces(lights: vpls.Vpls, count: int) -> list[np.ndarray]:
+    """Return the summed emission of each bounce; `ray` starts at 0 in each."""
     starts = [0, *(np.flatnonzero(np.diff(lights.ray) <= 0) + 1), len(lights)]
     return [lights.emission[a:b].sum(axis=0) for a, b in itertools.pairwise(starts)]
 
 
 def test_each_bounce_sends_out_the_albedos_share_of_the_one_before():
-    sums = by_bounce(cast(LIGHT, Tracer(CLOSED), 16384, "sobol", bounces=4), 16384)
+    sums = sum_bounces(cast(LIGHT, Tracer(CLOSED), 16384, "sobol", bounces=4), 16384)
     assert len(sums) == 4
     for before, after in itertools.pairwise(sums):
         np.testing.assert_allclose(after, before * ALBEDO, rtol=2e-3)
@@ -212,7 +212,7 @@ def test_a_bounce_takes_fewer_rays_where_there_is_less_to_carry():
 
 @pytest.mark.parametrize("count", [1, 7, 64])
 def test_a_bounce_never_has_more_lights_than_rays_left_the_light(count):
-    """Not even where nothing is absorbed and smooth normals bend the light up: the buffers rely on it."""
+    """Not even where nothing is absorbed and smooth normals raise the power: the buffers rely on it."""
     white = Tracer(build(sphere(1.0, 1, (1.0, 1.0, 1.0))))
     for seed in range(30):
         assert len(cast(LIGHT, white, count, "random", seed, bounces=4)) <= 4 * count

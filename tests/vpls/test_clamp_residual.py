@@ -1,4 +1,4 @@
-"""The light that the clamp takes, held against the path tracer, which knows clamp and cone in its own way."""
+"""The light that the clamp takes, compared with the path tracer, which has its own code for clamp and cone."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from deferred_ir.vpls.ray_sum import sum_radiance
 SIZE = (48, 32)
 
 
-def seen_by(scene, tracer, size=SIZE):
-    """What the pixels of a frame show, top row first, and all their hits."""
+def find_seen(scene, tracer, size=SIZE):
+    """Return the surfaces behind an image's pixels, top row first, and all hits."""
     hits = PathTracer(scene, tracer).trace_camera_rays(size)
     rows = np.flatnonzero(hits.hit)
     position, normal, smooth = (
@@ -32,18 +32,18 @@ def seen_by(scene, tracer, size=SIZE):
     return Surfaces(rows, position, normal, smooth), hits
 
 
-def given_back(scene, *, clamp, fov=180.0, seed=0, size=SIZE, samples=16.0, block=4, threads=None, **options):
-    """Radiance that the near field brings, (H, W, 3), top row first."""
+def trace_near_light(scene, *, clamp, fov=180.0, seed=0, size=SIZE, samples=16.0, block=4, threads=None, **options):
+    """Return the radiance that short rays restore, (H, W, 3), top row first."""
     tracer = Tracer(scene)
-    seen, hits = seen_by(scene, tracer, size)
+    seen, hits = find_seen(scene, tracer, size)
     limits = VplLimits.from_angle(fov, clamp * scene.geometry.diagonal)
     job = PixelJob(tracer, seen, size, block, seed, threads)
     image = trace_residual(job, limits, samples=samples, **options)
     return image[..., :3] * hits.albedo.reshape(*image.shape[:2], 3) / np.pi
 
 
-def lost(scene, *, clamp, fov=180.0, bounces=1, spp=192):
-    """The same by the path tracer, (H, W, 3), and the standard error of its mean."""
+def trace_lost_light(scene, *, clamp, fov=180.0, bounces=1, spp=192):
+    """Return the radiance lost to the limits by the path tracer, (H, W, 3), and the standard error of its mean."""
     tracer = Tracer(scene)
     whole, left = (
         PathTracer(scene, tracer, bounces, **limits).estimate(SIZE, spp, seed=seed)
@@ -53,13 +53,13 @@ def lost(scene, *, clamp, fov=180.0, bounces=1, spp=192):
     return whole.indirect - left.indirect, error
 
 
-def patterned_room():
-    """Rough walls, a smooth ball and a textured floor."""
+def make_patterned_room():
+    """Return a scene of flat walls, a smooth ball and a textured floor."""
     walls = room()
     ball = sphere(0.4, 2, (0.6, 0.7, 0.2))
     floor = plane(0.9, -0.98)
     both = build(
-        *[_mesh_of(walls)],
+        *[_get_mesh(walls)],
         replace(ball, positions=ball.positions + np.array([0.5, -0.7, 0.4])),
         floor,
         camera=walls.camera,
@@ -70,7 +70,7 @@ def patterned_room():
     return textured(both, [[[250, 30, 30], [30, 250, 30]], [[90, 90, 250], [200, 200, 200]]], uvs)
 
 
-def _mesh_of(scene):
+def _get_mesh(scene):
     from small_scenes import Mesh
 
     return Mesh(scene.geometry.positions, scene.geometry.faces, (0.5, 0.4, 0.3))
@@ -82,9 +82,9 @@ def _mesh_of(scene):
 @pytest.mark.parametrize("clamp", [0.02, 0.1, 10.0])
 def test_it_is_what_the_clamp_takes(clamp):
     """Also where c is larger than the scene."""
-    scene = patterned_room()
-    expected, error = lost(scene, clamp=clamp)
-    found = np.mean([given_back(scene, clamp=clamp, seed=seed) for seed in range(4)], axis=0)
+    scene = make_patterned_room()
+    expected, error = trace_lost_light(scene, clamp=clamp)
+    found = np.mean([trace_near_light(scene, clamp=clamp, seed=seed) for seed in range(4)], axis=0)
     assert expected.mean() > 0
     np.testing.assert_allclose(found.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), atol=4 * error.max(), rtol=0.01)
 
@@ -92,11 +92,11 @@ def test_it_is_what_the_clamp_takes(clamp):
 def test_clamped_vpls_and_the_near_field_are_one_bounce():
     scene, clamp = room(), 0.1
     tracer = Tracer(scene)
-    _, hits = seen_by(scene, tracer)
+    _, hits = find_seen(scene, tracer)
     vpls = cast(scene.spotlight, tracer, 2048, "sobol")
     limits = VplLimits(clamp * scene.geometry.diagonal)
     clamped = sum_radiance(tracer, hits, vpls, limits).reshape(SIZE[1], SIZE[0], 3)
-    found = clamped + given_back(scene, clamp=clamp)
+    found = clamped + trace_near_light(scene, clamp=clamp)
     truth = PathTracer(scene, tracer).estimate(SIZE, 256, seed=3)
     error = np.sqrt(truth.variance.sum(axis=(0, 1))) / truth.hit.size
     assert clamped.mean() < 0.98 * truth.indirect.mean()
@@ -108,10 +108,10 @@ def test_clamped_vpls_and_the_near_field_are_one_bounce():
 
 
 def test_further_bounces_lose_nothing_either():
-    scene = patterned_room()
-    expected, error = lost(scene, clamp=0.2, bounces=3)
-    once, _ = lost(scene, clamp=0.2)
-    found = np.mean([given_back(scene, clamp=0.2, bounces=3, seed=seed) for seed in range(4)], axis=0)
+    scene = make_patterned_room()
+    expected, error = trace_lost_light(scene, clamp=0.2, bounces=3)
+    once, _ = trace_lost_light(scene, clamp=0.2)
+    found = np.mean([trace_near_light(scene, clamp=0.2, bounces=3, seed=seed) for seed in range(4)], axis=0)
     assert expected.mean() > 1.1 * once.mean()
     np.testing.assert_allclose(found.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), atol=4 * error.max(), rtol=0.015)
 
@@ -119,20 +119,20 @@ def test_further_bounces_lose_nothing_either():
 def test_a_disc_light_is_asked_at_its_points():
     scene = room()
     scene = replace(scene, spotlight=replace(scene.spotlight, position=(-0.4, 0.3, 0.3), radius=0.4))
-    expected, error = lost(scene, clamp=0.2)
-    found = np.mean([given_back(scene, clamp=0.2, seed=seed) for seed in range(4)], axis=0)
+    expected, error = trace_lost_light(scene, clamp=0.2)
+    found = np.mean([trace_near_light(scene, clamp=0.2, seed=seed) for seed in range(4)], axis=0)
     np.testing.assert_allclose(found.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), atol=4 * error.max(), rtol=0.015)
 
 
-def test_light_outside_a_vpls_cone_is_given_back_as_far_as_the_rays_reach():
+def test_light_outside_a_vpls_cone_is_restored_as_far_as_the_rays_reach():
     scene = room()
-    expected, error = lost(scene, clamp=10.0, fov=120.0)
-    found = np.mean([given_back(scene, clamp=10.0, fov=120.0, seed=seed) for seed in range(4)], axis=0)
+    expected, error = trace_lost_light(scene, clamp=10.0, fov=120.0)
+    found = np.mean([trace_near_light(scene, clamp=10.0, fov=120.0, seed=seed) for seed in range(4)], axis=0)
     np.testing.assert_allclose(found.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), atol=4 * error.max(), rtol=0.01)
 
 
 def test_beside_a_wall_it_is_the_integral_over_the_wall():
-    """Points of a floor at 2 to 12 cm from a lit wall, against a sum over the wall written down here."""
+    """Points of a floor at 2 to 12 cm from a lit wall, against a sum over the wall."""
     light = Spotlight((1.0, 0.6, 0.0), (0.0, 0.2, 0.0), 90.0, (2.0, 3.0, 4.0))
     wall = quad((0, 0, 1), (0, 0, -1), (0, 1, -1), (0.5, 0.25, 0.75))
     scene = build(wall, plane(1.0, 0.0, (0, 0, 0)), spotlight=light)
@@ -163,14 +163,16 @@ def test_beside_a_wall_it_is_the_integral_over_the_wall():
 
 @pytest.mark.parametrize("factor", [1e-3, 1e3])
 def test_the_unit_of_length_does_not_matter(factor):
-    one, other = (given_back(scene, clamp=0.1, samples=4) for scene in (room(), scaled(room(), factor)))
+    one, other = (trace_near_light(scene, clamp=0.1, samples=4) for scene in (room(), scaled(room(), factor)))
     same = np.isclose(other, one, rtol=1e-3, atol=1e-3 * one.mean())
     assert same.mean() > 0.999  # a ray may pass an edge on the other side
     assert other.mean() == pytest.approx(one.mean(), rel=1e-3)
 
 
 def test_a_seed_is_an_image_whatever_the_threads():
-    images = [given_back(room(), clamp=0.1, threads=threads, seed=seed) for threads, seed in ((1, 5), (3, 5), (1, 6))]
+    images = [
+        trace_near_light(room(), clamp=0.1, threads=threads, seed=seed) for threads, seed in ((1, 5), (3, 5), (1, 6))
+    ]
     np.testing.assert_array_equal(images[0], images[1])
     assert (images[0] != images[2]).any()
 
@@ -178,9 +180,9 @@ def test_a_seed_is_an_image_whatever_the_threads():
 @pytest.mark.parametrize("samples", [0.25, 0.5, 1.0, 2.0, 3.0, 8.0])
 def test_any_number_of_rays_has_the_same_mean(samples):
     scene = room()
-    expected = np.mean([given_back(scene, clamp=0.2, seed=seed).mean() for seed in range(4)])
+    expected = np.mean([trace_near_light(scene, clamp=0.2, seed=seed).mean() for seed in range(4)])
     seeds = int(max(48 / samples, 12))
-    means = [given_back(scene, clamp=0.2, samples=samples, seed=10 + seed).mean() for seed in range(seeds)]
+    means = [trace_near_light(scene, clamp=0.2, samples=samples, seed=10 + seed).mean() for seed in range(seeds)]
     error = np.std(means) / seeds**0.5
     assert error < 0.02 * expected
     assert np.mean(means) == pytest.approx(expected, abs=4 * error + 0.005 * expected)
@@ -191,7 +193,7 @@ def test_any_number_of_rays_has_the_same_mean(samples):
 
 def test_a_block_errs_less_than_independent_rays_would():
     scene = room()
-    images = np.array([given_back(scene, clamp=0.3, samples=1, seed=seed).mean(axis=2) for seed in range(24)])
+    images = np.array([trace_near_light(scene, clamp=0.3, samples=1, seed=seed).mean(axis=2) for seed in range(24)])
     alone = images.var(axis=0, ddof=1)
     windows = sum(images[:, i : i + 29, j : j + 45] for i in range(4) for j in range(4)) / 16
     independent = sum(alone[i : i + 29, j : j + 45] for i in range(4) for j in range(4)) / 256
@@ -202,7 +204,7 @@ def test_a_block_errs_less_than_independent_rays_would():
 def test_weights_of_a_window_add_up_to_its_pixels(samples):
     scene = room()
     tracer = Tracer(scene)
-    seen, _ = seen_by(scene, tracer)
+    seen, _ = find_seen(scene, tracer)
     image = trace_residual(PixelJob(tracer, seen, SIZE, 4), VplLimits(0.2), samples=samples)
     for y, x in ((0, 0), (3, 5), (28, 44)):
         assert image[y : y + 4, x : x + 4, 3].mean() == 1
@@ -214,7 +216,7 @@ def test_weights_of_a_window_add_up_to_its_pixels(samples):
 def test_the_background_and_no_clamp_have_no_residual():
     ball = build(sphere(0.5), plane(0.6, -0.5), camera=Camera((0.0, 0.5, 3.0), (0.0, 0.0, 0.0)))
     tracer = Tracer(ball)
-    seen, hits = seen_by(ball, tracer)
+    seen, hits = find_seen(ball, tracer)
     image = trace_residual(PixelJob(tracer, seen, SIZE, 4), VplLimits(0.5), samples=4)
     np.testing.assert_array_equal(image[..., 3] > 0, hits.hit.reshape(SIZE[1], SIZE[0]))
     assert (image[~hits.hit.reshape(SIZE[1], SIZE[0])] == 0).all()
@@ -227,7 +229,7 @@ def test_the_background_and_no_clamp_have_no_residual():
 def test_where_no_ray_meets_anything_further_bounces_bring_nothing():
     floor = build(plane(), camera=Camera((0.0, 2.0, 0.1), (0.0, 0.0, 0.0)))
     tracer = Tracer(floor)
-    seen, _ = seen_by(floor, tracer)
+    seen, _ = find_seen(floor, tracer)
     image = trace_residual(PixelJob(tracer, seen, SIZE, 4), VplLimits(0.5), samples=1, bounces=3)
     assert (image[..., 3] == 1).any()
     assert (image[..., :3] == 0).all()
@@ -242,7 +244,7 @@ def test_faces_twice_at_the_same_place_change_nothing():
         faces=np.concatenate([geometry.faces, geometry.faces[:, [1, 2, 0]], slivers]),
         face_materials=np.concatenate([geometry.face_materials, geometry.face_materials, [0, 0]]),
     )
-    one, other = (given_back(s, clamp=0.1, samples=4) for s in (scene, replace(scene, geometry=twice)))
+    one, other = (trace_near_light(s, clamp=0.1, samples=4) for s in (scene, replace(scene, geometry=twice)))
     assert np.isclose(other, one, rtol=1e-4, atol=1e-4 * one.mean()).mean() > 0.999
 
 
@@ -268,7 +270,7 @@ inputs = { vpls = "vpl.vpls", depth = "gbuffer.depth", normals = "gbuffer.normal
 """
 
 
-def graph_file(folder, more=""):
+def write_graph(folder, more=""):
     path = folder / "near.toml"
     path.write_text(GRAPH + more, encoding="utf-8")
     return path
@@ -276,13 +278,13 @@ def graph_file(folder, more=""):
 
 @pytest.mark.parametrize("scene", [room(), build(sphere(0.5), camera=Camera((0.0, 0.5, 3.0), (0.0, 0.0, 0.0)))])
 def test_the_g_buffer_gives_the_surfaces_that_rays_find(renderer, tmp_path, scene):
-    one = renderer(SIZE, graph_file(tmp_path))
+    one = renderer(SIZE, write_graph(tmp_path))
     one.draw(scene, one.plan(scene, 1))
     with one.gpu.ctx:
         depth, normals = (one.executor.resource(("gbuffer", port)).read() for port in ("depth", "normals"))
     near = NEAR * scene.geometry.diagonal
     found = decode_gbuffer(scene.camera, near, depth[..., 0], normals)
-    expected, _ = seen_by(scene, one.tracer())
+    expected, _ = find_seen(scene, one.tracer())
     flipped = (SIZE[1] - 1 - found.pixel // SIZE[0]) * SIZE[0] + found.pixel % SIZE[0]
     common, mine, theirs = np.intersect1d(flipped, expected.pixel, return_indices=True)
     assert len(common) >= 0.99 * max(len(expected.pixel), len(found.pixel)) > 0
@@ -295,22 +297,22 @@ def test_the_g_buffer_gives_the_surfaces_that_rays_find(renderer, tmp_path, scen
 
 def test_the_pass_makes_the_image_of_the_core(renderer, tmp_path):
     scene = room()
-    one = renderer(SIZE, graph_file(tmp_path), set={"vpl.clamp": 0.1, "vpl.fov": 179.9, "near_field.samples": 16})
+    one = renderer(SIZE, write_graph(tmp_path), set={"vpl.clamp": 0.1, "vpl.fov": 179.9, "near_field.samples": 16})
     plan = one.plan(scene, 16)
     one.draw(scene, plan, seed=3)
     with one.gpu.ctx:
         image = one.executor.resource(("near_field", "residual")).read()[::-1]
     assert np.isfinite(image).all()
     assert (image[..., 3] == 1).all()
-    _, hits = seen_by(scene, one.tracer())
+    _, hits = find_seen(scene, one.tracer())
     found = image[..., :3] * hits.albedo.reshape(SIZE[1], SIZE[0], 3) / np.pi
-    assert found.mean() == pytest.approx(given_back(scene, clamp=0.1).mean(), rel=0.05)
+    assert found.mean() == pytest.approx(trace_near_light(scene, clamp=0.1).mean(), rel=0.05)
 
 
 def test_it_reads_bounces_and_cone_from_the_lights(renderer, tmp_path):
     scene, means = room(), []
     for settings in ({}, {"vpl.bounces": 3}, {"vpl.fov": 90.0}):
-        one = renderer(SIZE, graph_file(tmp_path), set={"vpl.clamp": 0.2, "vpl.fov": 179.9, **settings})
+        one = renderer(SIZE, write_graph(tmp_path), set={"vpl.clamp": 0.2, "vpl.fov": 179.9, **settings})
         one.draw(scene, one.plan(scene, 16))
         with one.gpu.ctx:
             means.append(one.executor.resource(("near_field", "residual")).read()[..., :3].mean())
@@ -320,7 +322,7 @@ def test_it_reads_bounces_and_cone_from_the_lights(renderer, tmp_path):
 
 @pytest.mark.parametrize("setting", ["vpl.clamp", "vpl.count"])
 def test_where_nothing_is_clamped_it_is_left_out_and_says_why(setting, renderer, tmp_path):
-    one = renderer(SIZE, graph_file(tmp_path), set={setting: 0})
+    one = renderer(SIZE, write_graph(tmp_path), set={setting: 0})
     scene = room()
     assert one.plan(scene, outputs=["radiance"]).left_out["near_field"].startswith("nothing is clamped: vpl.clamp")
     dark = replace(scene, spotlight=replace(scene.spotlight, emission=(0.0, 0.0, 0.0)))
@@ -329,7 +331,7 @@ def test_where_nothing_is_clamped_it_is_left_out_and_says_why(setting, renderer,
 
 @pytest.mark.parametrize(("n", "off"), [(1, 0.01), (4, 0.02)])
 def test_the_graph_accurate_is_one_bounce_of_light(renderer, n, off):
-    """Interleaved, what edges take from the filter's window shows in so small an image."""
+    """The tolerance is larger with interleaving: in so small an image, many filter windows are cut by edges."""
     scene, size = room(), (96, 64)
     one = renderer(size, "accurate", set={"vpl.clamp": 0.1, "interleave.n": n})
     image = one.render(scene, vpls=512).radiance

@@ -1,4 +1,4 @@
-"""The disc in which equal areas get equal light."""
+"""The disc on which equal areas get equal light."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from deferred_ir.vpls.emission_disc import EmissionDisc
 FOVS = [0.1, 30.0, 100.0, 160.0, 179.99]
 
 
-def disc_of(fov):
+def make_disc(fov):
     light = Spotlight((0.3, 0.2, 0.1), (1.0, -2.0, 0.4), fov)
     return light, EmissionDisc(light, np.stack(build_basis(light.axis)))
 
 
 @pytest.mark.parametrize("fov", FOVS)
-def test_points_and_directions_are_each_others_reverse(fov):
-    light, emission = disc_of(fov)
+def test_points_and_directions_are_each_others_inverse(fov):
+    light, emission = make_disc(fov)
     points = 0.999 * square_to_disc(np.random.default_rng(1).random((1000, 2)))
     directions = emission.unproject(points)
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1)
@@ -34,8 +34,8 @@ def test_points_and_directions_are_each_others_reverse(fov):
 
 @pytest.mark.parametrize("fov", FOVS)
 def test_a_part_of_the_disc_gets_its_share_of_the_light(fov):
-    """Light by Nusselt's analogue and the cone, summed where the points fall."""
-    light, emission = disc_of(fov)
+    """Light by Nusselt's analogue and the cone, summed where its points fall on the disc."""
+    light, emission = make_disc(fov)
     even = sample_unit_disc("sobol", 2**16, 0) * math.sin(math.radians(fov) / 2)
     directions = lift_to_hemisphere(even, light.axis[None])
     points, sent = emission.project(directions), light.cone(directions) / len(even)

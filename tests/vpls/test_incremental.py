@@ -1,4 +1,4 @@
-"""VPLs that outlive their frame: what holds in every frame, whatever the light does."""
+"""VPLs that outlive their frame: invariants of every frame, whatever the light does."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ ROOM = Tracer(room())
 SCENES = {"room": ROOM, "half": Tracer(build(plane(0.8, -0.5), plane(0.8, 0.4)))}
 
 
-def frames(state, lights, tracer=EMPTY, least=4, most=8):
+def run_frames(state, lights, tracer=EMPTY, least=4, most=8):
     return [state.update(light, tracer, least=least, most=most) for light in lights]
 
 
 @st.composite
 def paths(draw):
-    """Frames of a light that drifts, jumps, turns and changes its cone, in and out of the boxes' walls."""
+    """Draw frames of a light that drifts, jumps, turns and changes its cone, inside and outside the boxes' walls."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32)))
     position, aim, fov = rng.uniform(-0.8, 0.8, 3), rng.uniform(-1, 1, 3), rng.uniform(1, 179)
     radius = draw(st.sampled_from([0.0, 0.1]))
@@ -68,7 +68,7 @@ def test_what_holds_in_every_frame(lights, scene, count, budget, seed):
         assert (vpls.ray == again.ray).all()
         assert (vpls.emission == again.emission).all()
         assert (vpls.position == again.position).all()
-        # The budget is kept, and used where there is room.
+        # The budget is respected, and used where there is room.
         fresh = one.used & ((one.version != before) | ~was)
         assert fresh.sum() <= most
         assert most == 0 or one.used.any()
@@ -104,36 +104,36 @@ def test_vpls_that_stay_keep_slot_position_and_version():
 @pytest.mark.parametrize("count", [64, 256])
 def test_the_power_is_that_of_the_light(count):
     state = IncrementalVpls(count, seed=3)
-    vpls = frames(state, [LIGHT] * (count // 8))[-1]
+    vpls = run_frames(state, [LIGHT] * (count // 8))[-1]
     assert len(vpls) == count
     expected = np.array(LIGHT.emission) * math.sin(math.radians(50)) ** 2 * ALBEDO * mean_cone_factor(100)
     np.testing.assert_allclose(vpls.emission.sum(axis=0), expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.2])
-def test_moving_there_gives_as_much_as_being_there(radius):
-    """Weights follow the light: after a long way the sum is that of a light that never moved."""
+def test_a_light_that_moves_there_gives_as_much_as_one_that_stands_there(radius):
+    """Weights follow the light: after a long path the sum is that of a light that never moved."""
     way = [replace(LIGHT, position=(0.1 + 0.005 * i, 0.2, -0.1), radius=radius) for i in range(60)]
-    moved = frames(IncrementalVpls(128), way)[-1]
-    still = frames(IncrementalVpls(128), [way[-1]] * 16)[-1]
+    moved = run_frames(IncrementalVpls(128), way)[-1]
+    still = run_frames(IncrementalVpls(128), [way[-1]] * 16)[-1]
     np.testing.assert_allclose(moved.emission.sum(axis=0), still.emission.sum(axis=0), rtol=1e-6)
 
 
 def test_a_still_light_comes_to_rest():
     state = IncrementalVpls(64)
-    frames(state, [LIGHT] * 24)
+    run_frames(state, [LIGHT] * 24)
     before = state.version.copy()
-    frames(state, [LIGHT] * 8)
+    run_frames(state, [LIGHT] * 8)
     assert (state.version == before).all()
 
 
 def test_sites_spread_out_again_after_the_light_has_moved():
     state = IncrementalVpls(64)
-    frames(state, [LIGHT] * 8)
+    run_frames(state, [LIGHT] * 8)
     far = replace(LIGHT, position=(0.6, 0.6, -0.1))
-    frames(state, [far])
+    run_frames(state, [far])
     uneven = state.weights.max()
-    frames(state, [far] * 40)
+    run_frames(state, [far] * 40)
     assert state.weights.max() < 0.7 * uneven
 
 
@@ -141,30 +141,30 @@ def test_a_ray_that_misses_loses_its_cells_light_and_is_not_tried_again():
     tracer = Tracer(build(plane(0.3, -1.0)))
     light = replace(LIGHT, position=(0.0, 0.0, 0.0), look_at=(0.0, -1.0, 0.0), fov=120.0)
     state = IncrementalVpls(64)
-    vpls = frames(state, [light] * 16, tracer)[-1]
+    vpls = run_frames(state, [light] * 16, tracer)[-1]
     assert state.used.all()
     assert 3 < len(vpls) < 32
     before = state.version.copy()
-    again = frames(state, [light] * 4, tracer)[-1]
+    again = run_frames(state, [light] * 4, tracer)[-1]
     assert (state.version == before).all()
     assert len(again) == len(vpls)
-    whole = frames(IncrementalVpls(64), [light] * 16, Tracer(build(plane(99.0, -1.0))))[-1]
+    whole = run_frames(IncrementalVpls(64), [light] * 16, Tracer(build(plane(99.0, -1.0))))[-1]
     assert vpls.emission.sum() < 0.5 * whole.emission.sum()
     # Where there is something to meet later on, the site is free for it.
-    assert len(frames(state, [light] * 16, Tracer(build(plane(99.0, -1.0))))[-1]) == 64
+    assert len(run_frames(state, [light] * 16, Tracer(build(plane(99.0, -1.0))))[-1]) == 64
 
 
 def test_black_surfaces_hold_their_sites_and_make_no_vpl():
     state = IncrementalVpls(16)
-    assert len(frames(state, [LIGHT] * 4, Tracer(build(box((-1, -1, -1), (1, 1, 1), (0, 0, 0)))))[-1]) == 0
+    assert len(run_frames(state, [LIGHT] * 4, Tracer(build(box((-1, -1, -1), (1, 1, 1), (0, 0, 0)))))[-1]) == 0
     assert state.used.all()
 
 
 def test_a_light_that_jumps_is_refilled_within_the_budget():
     state = IncrementalVpls(64)
-    frames(state, [LIGHT] * 8)
+    run_frames(state, [LIGHT] * 8)
     away = replace(LIGHT, look_at=(0.1, 1.0, -0.1))
-    alive = [len(vpls) for vpls in frames(state, [away] * 8)]
+    alive = [len(vpls) for vpls in run_frames(state, [away] * 8)]
     assert alive[0] < 24
     assert (np.diff(alive) <= 8).all()
     assert alive[-1] == 64

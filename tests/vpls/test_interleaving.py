@@ -39,7 +39,7 @@ def test_the_order_is_fixed_and_has_no_structure():
 
 
 def test_vpls_that_stay_keep_their_order_and_nearly_all_their_shares():
-    """One that goes would change the share of every other, if they were dealt by number."""
+    """If VPLs were dealt by number, removing one would change the share of every other."""
     slots, starts = np.arange(256), find_share_starts(255, 4)
     before = deal(slots, 256)
     for gone in (0, 100, 255):
@@ -62,20 +62,20 @@ def test_sub_buffers_hold_every_pixel_once(size, n):
     assert (filled == 1).all()
 
 
-def images(make, scene, vpls, size, **settings):
-    """Radiance by `deferred` and by `interleaved` with these settings, and the second Renderer."""
+def render_both(make, scene, vpls, size, **settings):
+    """Return radiance by `deferred` and by `interleaved` with these settings, and the second Renderer."""
     full = make(size, "deferred").render(scene, vpls=vpls, seed=1).radiance
     one = make(size, "interleaved", set={name.replace("__", "."): value for name, value in settings.items()})
     return full, one.render(scene, vpls=vpls, seed=1).radiance, one
 
 
-def written(one, port):
+def read_port(one, port):
     with one.gpu.ctx:
         return one.executor.resource(tuple(port.split("."))).read()
 
 
 def test_with_blocks_of_one_pixel_it_is_the_deferred_image(renderer):
-    full, shared, one = images(renderer, room(), 24, (40, 32), interleave__n=1)
+    full, shared, one = render_both(renderer, room(), 24, (40, 32), interleave__n=1)
     assert (full == shared).all()
     assert "every pixel is lit by all VPLs" in one.plan(room(), 24).left_out["interleave"]
 
@@ -92,17 +92,17 @@ def test_the_filter_is_what_it_says(renderer, n, size):
     scene = crooked_room()
     one = renderer(size, "interleaved", set={"interleave.n": n}, keep_all=True)
     one.render(scene, vpls=70, seed=1)
-    irradiance = written(one, "gather.irradiance")[..., :3]
-    depth, normals = written(one, "gbuffer.depth")[..., 0], written(one, "gbuffer.normals")
-    shares = written(one, "light_shares.shares")[..., :3]
-    expected, thin = gathered(scene, n, 0.5, shares, (depth, normals))
-    listed = written(one, "gather.thin").ravel()[: written(one, "gather.count").item()]
+    irradiance = read_port(one, "gather.irradiance")[..., :3]
+    depth, normals = read_port(one, "gbuffer.depth")[..., 0], read_port(one, "gbuffer.normals")
+    shares = read_port(one, "light_shares.shares")[..., :3]
+    expected, thin = gather_by_definition(scene, n, 0.5, shares, (depth, normals))
+    listed = read_port(one, "gather.thin").ravel()[: read_port(one, "gather.count").item()]
     assert sorted(listed) == np.flatnonzero(thin).tolist()
     np.testing.assert_allclose(irradiance[~thin], expected[~thin], rtol=2e-5, atol=1e-6)
 
 
-def gathered(scene, n, fewest, shares, gbuffer):
-    """The filter from its definition: irradiance (H, W, 3) and where too few neighbours count (H, W)."""
+def gather_by_definition(scene, n, fewest, shares, gbuffer):
+    """Filter by the definition. Returns irradiance (H, W, 3) and where too few neighbours count (H, W)."""
     depth, normals = gbuffer
     height, width = depth.shape
     position, normal, shading = np.zeros((3, height, width, 3))
@@ -206,13 +206,13 @@ def test_no_light_crosses_an_edge(renderer, tmp_path, name, n):
 @pytest.mark.parametrize("n", [2, 4, 8])
 @pytest.mark.parametrize("vpls", [0, 1, 3, 15])
 def test_fewer_vpls_than_pixels_of_a_block(renderer, n, vpls):
-    full, shared, _ = images(renderer, room(), vpls, (64, 48), interleave__n=n)
+    full, shared, _ = render_both(renderer, room(), vpls, (64, 48), interleave__n=n)
     assert np.isfinite(shared).all()
     assert shared.mean() == pytest.approx(full.mean(), rel=0.15)  # edges are as wide as blocks in so small an image
 
 
 def test_more_vpls_in_a_share_than_in_a_block_of_the_buffer(renderer):
-    """A share then takes several draws, which are added."""
+    """Such a share takes several draws, whose results are added."""
     settings = {"shadow_maps.vpl_size": 16, "interleave.n": 2}
     full, shared = (
         renderer((48, 40), graph, set=chosen).render(room(), vpls=1000).radiance
@@ -224,12 +224,12 @@ def test_more_vpls_in_a_share_than_in_a_block_of_the_buffer(renderer):
 
 
 def test_it_goes_without_shadow_maps(renderer, tmp_path):
-    """What the filter uploads for its list stays out of the way of the textures that it reads."""
+    """The filter's uploads for its list must not disturb the textures that it reads."""
     readers, images = {"deferred": ("lighting",), "interleaved": ("lighting", "gather", "light_shares")}, []
     for name, passes in readers.items():
         wires = [f"[passes.{reader}.inputs]\nshadows = false" for reader in passes]
         text = [f'extends = "{name}"', "[passes]", "shadow_maps = false", *wires]
-        text[3] += "\nblockers = false"
+        text[3] += "\nviews = false\nblockers = false"
         (tmp_path / f"{name}.toml").write_text("\n".join(text))
         images.append(renderer((64, 48), tmp_path / f"{name}.toml").render(crooked_room(), vpls=64).radiance)
     full, shared = images
@@ -237,8 +237,8 @@ def test_it_goes_without_shadow_maps(renderer, tmp_path):
     assert shared.mean() == pytest.approx(full.mean(), rel=1e-2)
 
 
-def leaves(count):
-    """Small triangles in all directions, so many that nearly every pixel has an edge beside it."""
+def make_leaves(count):
+    """Return so many small triangles in all directions that nearly every pixel has an edge beside it."""
     rng = np.random.default_rng(2)
     centre = rng.uniform(-1, 1, (count, 1, 3))
     corners = centre + rng.normal(size=(count, 3, 3)) * 0.04
@@ -246,10 +246,10 @@ def leaves(count):
 
 
 def test_foliage_has_no_holes(renderer):
-    scene = build(plane(2.0, -1.0), leaves(6000), camera=Camera((0.0, 1.0, 3.5), (0.0, 0.0, 0.0), fov=45.0))
-    full, shared, one = images(renderer, scene, 64, (96, 80))
-    hit = written(one, "gbuffer.depth")[::-1, :, 0] > 0
-    assert written(one, "gather.count").item() > 0.2 * hit.sum()
+    scene = build(plane(2.0, -1.0), make_leaves(6000), camera=Camera((0.0, 1.0, 3.5), (0.0, 0.0, 0.0), fov=45.0))
+    full, shared, one = render_both(renderer, scene, 64, (96, 80))
+    hit = read_port(one, "gbuffer.depth")[::-1, :, 0] > 0
+    assert read_port(one, "gather.count").item() > 0.2 * hit.sum()
     lit = full.max(axis=-1) > 0.1 * full[hit].mean()
     assert (shared[lit].max(axis=-1) > 0).mean() > 0.995
     assert rel_mse(shared, full, hit, trim=1e-3) < 0.05
@@ -261,17 +261,17 @@ def test_foliage_has_no_holes(renderer):
 def test_where_no_neighbour_counts_it_is_the_deferred_image(renderer, n):
     """Pixels ask for all shares but, at most, their own, in several blocks of the buffer."""
     settings = {"gather__angle": 0.0, "gather__fewest": 1.0, "interleave__n": n}
-    full, shared, one = images(renderer, crooked_room(), 300, (64, 48), **settings)
-    assert written(one, "gather.count").item() == 64 * 48
+    full, shared, one = render_both(renderer, crooked_room(), 300, (64, 48), **settings)
+    assert read_port(one, "gather.count").item() == 64 * 48
     assert_same_but_for_edges(shared, full)
 
 
 def test_the_more_pixels_ask_the_missing_vpls_the_less_the_error(renderer):
     scene, errors, asked = load("atrium"), [], []
     for fewest in (0.0, 0.5, 1.0):
-        full, shared, one = images(renderer, scene, 64, (96, 96), gather__fewest=fewest)
+        full, shared, one = render_both(renderer, scene, 64, (96, 96), gather__fewest=fewest)
         errors.append(rel_mse(shared, full, full.max(axis=-1) > 0, trim=1e-3))
-        asked.append(written(one, "gather.count").item())
+        asked.append(read_port(one, "gather.count").item())
     assert asked == sorted(asked)
     assert errors[2] < 0.7 * errors[1] < 0.5 * errors[0]
 
@@ -279,7 +279,7 @@ def test_the_more_pixels_ask_the_missing_vpls_the_less_the_error(renderer):
 @pytest.mark.parametrize(("name", "bound"), [("cornell", 0.01), ("colors", 0.01), ("atrium", 0.03)])
 def test_it_adds_little_error_on_built_in_scenes(renderer, name, bound):
     scene, size = load(name), (128, 128)
-    full, shared, _ = images(renderer, scene, 64, size)
+    full, shared, _ = render_both(renderer, scene, 64, size)
     rays = scene.camera.rays(size).reshape(-1, 3)
     hit = Tracer(scene).closest(np.broadcast_to(scene.camera.position, rays.shape), rays).hit.reshape(size)
     assert rel_mse(shared, full, hit, trim=1e-3) < bound
@@ -287,6 +287,6 @@ def test_it_adds_little_error_on_built_in_scenes(renderer, name, bound):
 
 
 def test_a_surface_with_smooth_normals_is_no_edge(renderer):
-    _, _, one = images(renderer, build(sphere(), camera=Camera((0, 0, 3), (0, 0, 0), fov=45.0)), 16, (96, 96))
-    depth = written(one, "gbuffer.depth")[..., 0]
-    assert written(one, "gather.count").item() < 0.1 * (depth > 0).sum()
+    _, _, one = render_both(renderer, build(sphere(), camera=Camera((0, 0, 3), (0, 0, 0), fov=45.0)), 16, (96, 96))
+    depth = read_port(one, "gbuffer.depth")[..., 0]
+    assert read_port(one, "gather.count").item() < 0.1 * (depth > 0).sum()

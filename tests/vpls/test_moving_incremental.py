@@ -1,4 +1,4 @@
-"""VPLs that outlive their frame while models move: what is given up, what is drawn anew, and when it rests."""
+"""VPLs that outlive their frame while models move: which are removed, which maps are redrawn, and when all rests."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def test_a_ray_that_missed_finds_a_model_that_comes():
 
 
 def test_vpls_go_with_their_model_and_shine_from_where_their_maps_are():
-    """More of them than the budget: each in its turn, none far behind, and all of them where they are in the end."""
+    """With more VPLs than the budget, each is redrawn in its turn, none lags far, and in the end none lags."""
     light = replace(LIGHT, position=(0.0, 0.9, 0.0), look_at=(0.0, -1.0, 0.0))
     slides = ModelMotion((0.0, 1.0), ((0.0, -0.5, 0.0), (0.0, -0.5, 0.6)), (STILL, STILL))
     scene = build(WALLS, box((-0.7, -0.1, -0.7), (0.7, 0.1, 0.7)), motions=(None, slides), spotlight=light)
@@ -201,7 +201,7 @@ def test_vpls_go_with_their_model_and_shine_from_where_their_maps_are():
     np.testing.assert_array_equal(vpls.position, state.position[vpls.ray])
 
 
-def test_a_vpl_on_a_model_that_jumps_is_given_up():
+def test_a_vpl_on_a_model_that_jumps_is_removed():
     light = replace(LIGHT, position=(0.0, 0.9, 0.0), look_at=(0.0, -1.0, 0.0), fov=60.0)
     jumps = ModelMotion((0.0, 1.0), ((0.0, -0.5, 0.0), (0.0, 0.1, 0.0)), (STILL, STILL))
     scene = build(WALLS, box((-0.7, -0.1, -0.7), (0.7, 0.1, 0.7)), motions=(None, jumps), spotlight=light)
@@ -219,7 +219,7 @@ def test_a_vpl_on_a_model_that_jumps_is_given_up():
 
 @pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
 def test_maps_at_rest_hold_what_maps_drawn_anew_hold(renderer, projection):
-    """And never more are drawn than the budget allows, the spotlight's besides."""
+    """And no frame draws more maps than the budget allows, besides the spotlight's."""
     scene = room_with_moving_models()
     one = renderer(SIZE, "incremental", set={**SETTINGS, "shadow_maps.projection": projection})
     plan = one.plan(scene)
@@ -265,7 +265,7 @@ def test_a_seed_gives_the_same_frames_again(renderer):
 
 
 def test_with_the_whole_budget_it_is_as_good_as_afresh(renderer):
-    """All stale maps are drawn at once: what is left of the difference is that of two sets of VPLs."""
+    """All stale maps are redrawn at once, so the remaining difference is that of two sets of VPLs."""
     scene = room_with_moving_block()
     one = renderer(SIZE, "incremental", set={**SETTINGS, "vpl.most": 64, "vpl.count": 64, "vpl.least": 0})
     plan = one.plan(scene)
@@ -279,7 +279,7 @@ def test_with_the_whole_budget_it_is_as_good_as_afresh(renderer):
 
 
 def test_an_update_that_is_broken_off_starts_afresh(renderer, monkeypatch):
-    """Else VPLs would have gone with their models in part."""
+    """Otherwise some VPLs would have moved with their models, and others not."""
     one, fresh = (renderer(SIZE, "incremental", set=SETTINGS) for _ in range(2))
     for time in (0.0, 0.1, 0.2):
         one.render(SCENE, time=time)

@@ -1,4 +1,4 @@
-"""VPLs chosen by their effect on the image: unbiased, and better where most VPLs light nothing that is seen."""
+"""VPLs chosen by their effect on the image: unbiased, and better where most VPLs light nothing in view."""
 
 from dataclasses import replace
 
@@ -22,37 +22,37 @@ SIZE = (64, 48)
 ROOMS = two_rooms()
 
 
-def limits(scene=ROOMS):
+def make_limits(scene=ROOMS):
     return VplLimits.from_angle(179.9, 0.02 * scene.geometry.diagonal)
 
 
-def candidates(scene=ROOMS, count=1024, seed=0, bounces=1):
+def cast_candidates(scene=ROOMS, count=1024, seed=0, bounces=1):
     return cast(scene.spotlight, Tracer(scene), count, "sobol", seed, bounces=bounces)
 
 
-def chosen(scene, count, seed, bounces=1, factor=16):
-    """As a render with `vpl.candidates` chooses."""
+def choose(scene, count, seed, bounces=1, factor=16):
+    """Choose VPLs as a render with `vpl.candidates` does."""
     tracer = Tracer(scene)
     vpls = cast(scene.spotlight, tracer, count * factor, "sobol", seed, bounces=bounces)
     seen = find_probes(tracer, scene.camera, SIZE, seed)
-    return resample(vpls, estimate_effects(tracer, seen, vpls, limits(scene)), count, seed)
+    return resample(vpls, estimate_effects(tracer, seen, vpls, make_limits(scene)), count, seed)
 
 
-def indirect(scene, vpls, size=(16, 12)):
+def render_indirect(scene, vpls, size=(16, 12)):
     tracer = Tracer(scene)
     seen = PathTracer(scene, tracer).trace_camera_rays(size)
-    return sum_radiance(tracer, seen, vpls, limits(scene)).reshape(size[1], size[0], 3)
+    return sum_radiance(tracer, seen, vpls, make_limits(scene)).reshape(size[1], size[0], 3)
 
 
-def made_up(count, seed=0):
-    """VPLs anywhere, of any power."""
+def make_random_vpls(count, seed=0):
+    """Return VPLs anywhere, of any power."""
     rng = np.random.default_rng(seed)
     normal = rng.normal(size=(count, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     return Vpls(rng.random((count, 3)), normal, rng.random((count, 3)) ** 4, np.arange(count))
 
 
-def lights(one):
+def read_vpls(one):
     return one.executor.resource(("vpl", "vpls")).records
 
 
@@ -60,27 +60,27 @@ def lights(one):
 
 
 def test_a_choice_is_right_on_average_in_every_pixel():
-    vpls = candidates()
+    vpls = cast_candidates()
     tracer = Tracer(ROOMS)
-    effect = estimate_effects(tracer, find_probes(tracer, ROOMS.camera, SIZE), vpls, limits())
-    images = np.array([indirect(ROOMS, resample(vpls, effect, 32, seed), (6, 4)) for seed in range(150)])
+    effect = estimate_effects(tracer, find_probes(tracer, ROOMS.camera, SIZE), vpls, make_limits())
+    images = np.array([render_indirect(ROOMS, resample(vpls, effect, 32, seed), (6, 4)) for seed in range(150)])
     error = images.std(axis=0) / np.sqrt(len(images))
-    off = np.abs(images.mean(axis=0) - indirect(ROOMS, vpls, (6, 4))) / error
+    off = np.abs(images.mean(axis=0) - render_indirect(ROOMS, vpls, (6, 4))) / error
     assert off.max() < 4.5  # of 72 values
     assert np.sqrt((off**2).mean()) < 1.5
 
 
 @pytest.mark.parametrize("bounces", [1, 3])
 def test_images_are_right_on_average(bounces):
-    truth = indirect(ROOMS, candidates(count=8192, seed=99, bounces=bounces)).mean()
-    means = [indirect(ROOMS, chosen(ROOMS, 32, seed, bounces)).mean() for seed in range(48)]
+    truth = render_indirect(ROOMS, cast_candidates(count=8192, seed=99, bounces=bounces)).mean()
+    means = [render_indirect(ROOMS, choose(ROOMS, 32, seed, bounces)).mean() for seed in range(48)]
     assert np.std(means) / np.sqrt(len(means)) < 0.03 * truth
     assert abs(np.mean(means) - truth) < 3.5 * np.std(means) / np.sqrt(len(means))
 
 
 @given(st.lists(st.floats(0, 1e6), min_size=2, max_size=40), st.integers(1, 12), st.integers(0, 9))
 def test_none_becomes_brighter_than_its_even_share_allows(effect, count, seed):
-    vpls = made_up(len(effect))
+    vpls = make_random_vpls(len(effect))
     kept = resample(vpls, np.array(effect), count, seed)
     assert len(kept) <= max(count, 1)
     assert len(set(kept.ray)) == len(kept)
@@ -92,7 +92,7 @@ def test_none_becomes_brighter_than_its_even_share_allows(effect, count, seed):
 
 
 def test_power_is_the_same_on_average():
-    vpls, rng = made_up(500), np.random.default_rng(4)
+    vpls, rng = make_random_vpls(500), np.random.default_rng(4)
     for effect in (rng.random(500) ** 8, np.eye(500)[7], np.zeros(500)):
         sums = np.array([resample(vpls, effect, 50, seed).emission.sum(axis=0) for seed in range(200)])
         error = sums.std(axis=0) / np.sqrt(len(sums))
@@ -100,7 +100,7 @@ def test_power_is_the_same_on_average():
 
 
 def test_without_any_effect_the_choice_is_even_and_keeps_its_strata():
-    vpls = made_up(4096)
+    vpls = make_random_vpls(4096)
     kept = resample(vpls, np.zeros(4096), 64)
     np.testing.assert_allclose(kept.emission, vpls.emission[kept.ray] * 64, rtol=1e-9)
     octants = np.bincount((kept.position > 0.5) @ (1, 2, 4), minlength=8)
@@ -108,22 +108,22 @@ def test_without_any_effect_the_choice_is_even_and_keeps_its_strata():
     assert octants.max() <= 11
 
 
-def test_no_more_than_wanted_are_all_kept_as_they_are():
-    vpls = made_up(10)
+def test_no_more_than_wanted_are_all_returned_unchanged():
+    vpls = make_random_vpls(10)
     for count in (10, 11, 1000):
         assert resample(vpls, np.arange(10.0), count) is vpls
     assert resample(NONE, np.zeros(0), 0) is NONE
 
 
 def test_one_that_does_nearly_all_is_one_light_of_many_draws():
-    vpls = made_up(20)
+    vpls = make_random_vpls(20)
     kept = resample(vpls, np.eye(20)[3], 10)
     assert len(kept) < 10
     assert (kept.ray == 3).sum() == 1
 
 
 def test_vpls_at_one_point_are_fine():
-    vpls = replace(made_up(30), position=np.full((30, 3), 0.25))
+    vpls = replace(make_random_vpls(30), position=np.full((30, 3), 0.25))
     assert len(resample(vpls, np.ones(30), 10)) == 10
 
 
@@ -131,7 +131,7 @@ def test_vpls_at_one_point_are_fine():
 
 
 def test_effects_are_what_a_pixel_gets_over_what_all_give_it():
-    tracer, vpls = Tracer(ROOMS), candidates(count=64)
+    tracer, vpls = Tracer(ROOMS), cast_candidates(count=64)
     seen = find_probes(tracer, ROOMS.camera, SIZE)
     grey = replace(vpls, emission=np.repeat(vpls.emission @ [[0.2126], [0.7152], [0.0722]], 3, axis=1))
     each = np.array(
@@ -140,7 +140,7 @@ def test_effects_are_what_a_pixel_gets_over_what_all_give_it():
                 tracer,
                 seen,
                 Vpls(*(getattr(grey, f)[[i]] for f in ("position", "normal", "emission", "ray"))),
-                limits(),
+                make_limits(),
             )[:, 0]
             for i in range(len(vpls))
         ]
@@ -148,21 +148,21 @@ def test_effects_are_what_a_pixel_gets_over_what_all_give_it():
     total = each.sum(axis=0)
     share = each[:, total > 0] / total[total > 0]
     np.testing.assert_allclose(
-        estimate_effects(tracer, seen, vpls, limits()), np.sqrt((share**2).sum(axis=1)), rtol=1e-4
+        estimate_effects(tracer, seen, vpls, make_limits()), np.sqrt((share**2).sum(axis=1)), rtol=1e-4
     )
 
 
 @pytest.mark.parametrize("count", [0, 5, 3000])
 def test_any_number_of_threads_gives_the_same(count):
-    tracer, vpls = Tracer(ROOMS), candidates(count=count)
+    tracer, vpls = Tracer(ROOMS), cast_candidates(count=count)
     seen = find_probes(tracer, ROOMS.camera, SIZE)
-    one, four = (estimate_effects(tracer, seen, vpls, limits(), threads=threads) for threads in (1, 4))
+    one, four = (estimate_effects(tracer, seen, vpls, make_limits(), threads=threads) for threads in (1, 4))
     np.testing.assert_array_equal(one, four)
     assert one.shape == (len(vpls),)
 
 
 def test_extreme_power_and_no_clamp_leave_effects_finite():
-    tracer, vpls = Tracer(ROOMS), candidates(count=64)
+    tracer, vpls = Tracer(ROOMS), cast_candidates(count=64)
     seen = find_probes(tracer, ROOMS.camera, SIZE)
     unclamped = VplLimits.from_angle(150.0, 0.0)
     usual = estimate_effects(tracer, seen, vpls, unclamped)
@@ -170,7 +170,7 @@ def test_extreme_power_and_no_clamp_leave_effects_finite():
         extreme = replace(vpls, emission=vpls.emission * factor)
         np.testing.assert_allclose(estimate_effects(tracer, seen, extreme, unclamped), usual, rtol=1e-5)
     dark = replace(vpls, emission=vpls.emission * 0)
-    np.testing.assert_array_equal(estimate_effects(tracer, seen, dark, limits()), 0)
+    np.testing.assert_array_equal(estimate_effects(tracer, seen, dark, make_limits()), 0)
 
 
 def test_probes_are_pixels_of_the_image_all_over_it():
@@ -196,19 +196,21 @@ def test_probes_pass_over_the_background():
 
 
 def test_the_error_falls_where_little_of_the_light_reaches_what_is_seen():
-    truth = indirect(ROOMS, candidates(count=4096, seed=99))
+    truth = render_indirect(ROOMS, cast_candidates(count=4096, seed=99))
     everywhere = np.ones(truth.shape[:2], bool)
-    plain = [rel_mse(indirect(ROOMS, candidates(count=64, seed=seed)), truth, everywhere) for seed in range(6)]
-    better = [rel_mse(indirect(ROOMS, chosen(ROOMS, 64, seed)), truth, everywhere) for seed in range(6)]
+    plain = [
+        rel_mse(render_indirect(ROOMS, cast_candidates(count=64, seed=seed)), truth, everywhere) for seed in range(6)
+    ]
+    better = [rel_mse(render_indirect(ROOMS, choose(ROOMS, 64, seed)), truth, everywhere) for seed in range(6)]
     assert np.mean(better) < np.mean(plain) / 3
 
 
 def test_it_does_no_harm_where_all_of_the_light_is_seen():
     scene = room()
-    truth = indirect(scene, candidates(scene, 4096, 99))
+    truth = render_indirect(scene, cast_candidates(scene, 4096, 99))
     everywhere = np.ones(truth.shape[:2], bool)
-    plain = [rel_mse(indirect(scene, candidates(scene, 64, seed)), truth, everywhere) for seed in range(6)]
-    better = [rel_mse(indirect(scene, chosen(scene, 64, seed)), truth, everywhere) for seed in range(6)]
+    plain = [rel_mse(render_indirect(scene, cast_candidates(scene, 64, seed)), truth, everywhere) for seed in range(6)]
+    better = [rel_mse(render_indirect(scene, choose(scene, 64, seed)), truth, everywhere) for seed in range(6)]
     assert np.mean(better) < 1.2 * np.mean(plain)
 
 
@@ -218,16 +220,16 @@ def test_it_does_no_harm_where_all_of_the_light_is_seen():
 def test_one_candidate_a_vpl_is_what_it_always_was(renderer):
     one = renderer(SIZE, set={"vpl.candidates": 1})
     image = one.render(ROOMS, vpls=32, seed=3).radiance
-    vpls = candidates(count=32, seed=3)
-    np.testing.assert_allclose(lights(one)["position"][1:], vpls.position, atol=1e-5)  # lifted off their surfaces
-    np.testing.assert_array_equal(lights(one)["emission"][1:], vpls.emission.astype("f4"))
+    vpls = cast_candidates(count=32, seed=3)
+    np.testing.assert_allclose(read_vpls(one)["position"], vpls.position, atol=1e-5)  # lifted off their surfaces
+    np.testing.assert_array_equal(read_vpls(one)["emission"], vpls.emission.astype("f4"))
     np.testing.assert_array_equal(image, renderer(SIZE).render(ROOMS, vpls=32, seed=3).radiance)
 
 
 def test_a_frame_with_candidates_has_as_many_vpls_and_repeats_itself(renderer):
     one = renderer(SIZE, set={"vpl.candidates": 8})
     first = one.render(ROOMS, vpls=32, seed=1).radiance
-    assert one.executor.counters["vpls_alive"] == len(lights(one)) - 1
+    assert one.executor.counters["vpls_alive"] == len(read_vpls(one))
     assert 28 <= one.executor.counters["vpls_alive"] <= 32
     np.testing.assert_array_equal(one.render(ROOMS, vpls=32, seed=1).radiance, first)
     assert not np.array_equal(one.render(ROOMS, vpls=32, seed=2).radiance, first)
@@ -273,6 +275,6 @@ def test_the_choice_is_for_the_camera_of_the_frame(renderer):
     later = one.render(moving, vpls=16, time=1.0).radiance
     still = replace(ROOMS, camera=replace(moving.camera.at(1.0), motion=None))
     np.testing.assert_array_equal(one.render(still, vpls=16).radiance, later)
-    at_end = lights(one)["position"].copy()
+    at_end = read_vpls(one)["position"].copy()
     one.render(moving, vpls=16)
-    assert not np.array_equal(lights(one)["position"], at_end)
+    assert not np.array_equal(read_vpls(one)["position"], at_end)

@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     print_notes(list_notes(scene))
     defaults = scene.render.set if arguments.vpls is not None else {}
     with progress_bar() as bar:
-        traced = references.reference(
+        traced = references.trace_reference(
             scene,
             size,
             spp=arguments.spp,

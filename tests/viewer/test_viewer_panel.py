@@ -122,7 +122,7 @@ def depths(viewer, tile):
     session = viewer.session
     with viewer.window:
         if session.graph == "forward":
-            port, number = ("spot", 0) if tile < 0 else ("vpls", tile)
+            port, number = ("light_maps", 0) if tile < 0 else ("vpl_maps", tile)
             return session.output(("shadow_maps", port))[number].read()[..., 0]
         atlas, size = session.output(("shadow_maps", "atlas")).read()[..., 0], 256
         if tile < 0:

@@ -85,7 +85,8 @@ class Lighting(Pass):
     def _draw_blocks(self, io: Io, program: Program, vpls: np.ndarray) -> None:
         """Draw the whole frame once for each block of VPLs."""
         lit = vpls[find_shining(vpls)]
-        packed = np.zeros(-(-len(lit) // VPLS_PER_BLOCK) * VPLS_PER_BLOCK, VPL)
+        blocks = max(-(-len(lit) // VPLS_PER_BLOCK), 1)
+        packed = np.zeros(blocks * VPLS_PER_BLOCK, VPL)
         packed[: len(lit)] = lit
         buffer = io.gpu.uniforms(packed.tobytes()) if len(lit) < len(vpls) else None
         for start in range(0, max(len(lit), 1), VPLS_PER_BLOCK):

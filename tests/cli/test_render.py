@@ -62,7 +62,7 @@ def test_run_json_holds_what_the_contract_promises(tmp_path):
     assert [entry["what"] for entry in run["left_out"]] == absent
     assert run["memory_bytes"]["textures"] > 2 * 4 * 1024**2  # two layers of the atlas
     names = [entry["name"] for entry in run["passes"]]
-    assert sorted(names) == ["gbuffer", "lighting", "shadow_maps", "tonemap", "vpl"]
+    assert sorted(names) == ["gbuffer", "lighting", "lights", "shadow_maps", "tonemap", "vpl"]
     maps = next(entry for entry in run["passes"] if entry["name"] == "shadow_maps")
     assert [sub["state"] for sub in maps["subpasses"]] == ["dirty"] * (run["vpls_alive"] + 1)
     assert {sub["why"] for sub in maps["subpasses"]} == {"every frame redoes everything"}
@@ -127,7 +127,7 @@ def test_the_command_lines_vpl_count_wins_over_the_scenes(tmp_path, box, capsys)
     assert main(["render", *arguments, "--size", "16x16", "--device", "software", "--json", str(file)]) == 0
     assert json.loads(file.read_text())["vpls"] == 16
     assert main(["graph", "deferred", "--scene", *arguments]) == 0
-    assert "17 light" in capsys.readouterr().out
+    assert "16 vpl" in capsys.readouterr().out
 
 
 def test_only_numbers_of_the_form_04d_are_frames(tmp_path, monkeypatch):

@@ -1,18 +1,15 @@
-"""Put sub-buffers together and filter the pattern away inside surfaces: shares, G-buffer, lights -> irradiance.
+"""Filter the pattern of interleaving away inside surfaces: shares, window, lonely pixels -> irradiance.
 
-A window of n x n pixels has each share once wherever it lies; the mean over the neighbours on the pixel's own surface
-is what all VPLs give there (Laine et al. 2007, section 5.2). Where too few count, on thin things, the pixel itself asks
-the VPLs of the shares that are missing: such pixels are packed into rows of a second draw, so that no processor idles
-beside them. Which neighbours count follows from the G-buffer alone: where frames are reused it is kept with it.
+The mean over the pixels of the window on the pixel's own surface (passes/neighbours.py) is what all VPLs give there
+(Laine et al. 2007, section 5.2). Lonely pixels, on thin things, ask the VPLs of the shares that they miss: they are
+packed into rows of a second draw, so that no processor idles beside them.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
-from math import cos, radians, sin
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,97 +17,54 @@ from deferred_ir.base.arrays import Ints
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import count_shining
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
-from deferred_ir.vpls.interleaving import SharesMeta, find_share_starts
-
-IRRADIANCE, THIN, COUNT, MISSING = range(4)
-"""Image units that the shaders declare."""
-
-
-@dataclass(frozen=True)
-class Params:
-    """Parameters of the filter."""
-
-    angle: float = param(
-        25.0,
-        lo=0.0,
-        hi=180.0,
-        doc="Neighbours count whose normals differ by less, and that lie half as much off the plane.",
-    )
-    fewest: float = param(
-        0.5, lo=0.0, hi=1.0, doc="Where no larger part of the window counts, a pixel asks the missing VPLs itself."
-    )
-
-
-@dataclass
-class State:
-    """From what the neighbours that count were found, None if that is not known."""
-
-    windows: tuple[Any, ...] | None = None
+from deferred_ir.vpls.interleaving import SharesMeta, choose_window_side, find_share_starts
 
 
 class Gather(Pass):
     """A box filter that stops at edges."""
 
-    Params = Params
-    State = State
     inputs: ClassVar[Mapping[str, Input]] = {
         "vpls": Input("the VPLs in the order of their shares", format="share"),
         "shares": Input("irradiance in sub-buffers", format="rgba32f"),
+        "window": Input("which neighbours count", format="rg32ui"),
+        "lonely_pixels": Input("numbers of the pixels with too few neighbours", format="r32ui"),
+        "missing": Input("bits of the shares that each of them lacks", format="rg32ui"),
+        "lonely_count": Input("how many there are", format="r32ui"),
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
         "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
-        "rays": Input("which VPLs are seen: then they have no maps, and thin things are left", "r32ui", optional=True),
+        "rays": Input(
+            "which VPLs are seen: then they have no maps, and lonely pixels are left", "r32ui", optional=True
+        ),
         "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Irradiance of the frame's size, and the pixels that the window is not enough for."""
+        """One texture of the frame's size."""
         del inputs
-        return {
-            "irradiance": Output("irradiance from the VPLs", Texture("rgba32f"), transient=True),
-            "thin": Output("pixels that ask VPLs themselves, row by row", Texture("r32ui"), attach=False),
-            "missing": Output("of which shares, 64 bits a pixel", Texture("rg32ui"), attach=False),
-            "count": Output("how many", Texture("r32ui", (1, 1)), attach=False),
-        }
+        return {"irradiance": Output("irradiance from the VPLs", Texture("rgba32f"), transient=True)}
 
     def depends(self) -> frozenset[str]:
-        """Positions come back from the depth; the window leans to a side by the seed."""
+        """Lonely pixels' positions follow from the depth and the camera; the seed shifts the window."""
         return frozenset({"camera", "seed"})
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Filter, then light the pixels that it left."""
+        """Filter, then light the lonely pixels."""
         gpu, vpls = io.gpu, io["vpls"]
-        for unit, name in ((IRRADIANCE, "irradiance"), (THIN, "thin"), (COUNT, "count"), (MISSING, "missing")):
-            io[name].bind_image(unit)
-        io["count"].upload([[0]])
-        angle, shares = radians(self.params.angle), io.meta("vpls", SharesMeta).n ** 2
-        # An even window is off centre: in frames with fresh seeds to all sides, so that their mean is not.
-        side = frame.seed & 1, frame.seed >> 1 & 1
-        drawn = io["depth"].version, io["normals"].version
-        windows = (*drawn, shares, self.params, side) if frame.reuse else None
-        known = windows is not None and io.state.windows == windows
-        defines = shader_variants.choose_for_pixels(frame, vpls.records)
-        kept = {"SMOOTH": defines["SMOOTH"], "KEEP": int(frame.reuse), "KNOWN": int(known)}
-        program = io.program("gather.frag", defines=kept)
-        program.set(
-            cosine_squared=cos(angle) ** 2,
-            sine_squared=sin(angle / 2) ** 2,
-            fewest=self.params.fewest * shares,
-            side=side,
-        )
-        io.state.windows = None
+        program = io.program("gather.frag")
+        program.set(side=choose_window_side(frame.seed))
         program.draw_fullscreen()
-        io.state.windows = windows
         if io["rays"]:
-            gpu.barrier()
             return
+        defines = shader_variants.choose_for_pixels(frame, vpls.records)
         program = io.program("lonely_pixels/light.frag", "lonely_pixels/rows.vert", defines=defines)
+        io["irradiance"].bind_image(0)
         gpu.clip(1)  # to the rows that the list fills
         gpu.gl.ColorMask(0, 0, 0, 0)  # the shader stores where each pixel belongs
+        shares = io.meta("vpls", SharesMeta).n ** 2
         block = vpls.description.block
         for start in range(0, len(vpls.records), block):
             ranges = _ranges(vpls.records, shares, start, start + block)
@@ -124,7 +78,7 @@ class Gather(Pass):
 
 
 def _ranges(vpls: np.ndarray, shares: int, start: int, stop: int) -> Ints:
-    """Where in the block from `start` to `stop` of VPLs, VPL records (n,), each share begins and ends, int (s, 2)."""
+    """Return where each share begins and ends in the block of VPLs `start` to `stop` (VPL records), int (s, 2)."""
     starts = np.clip(find_share_starts(len(vpls), round(shares**0.5)), start, stop)
     ends = [first + count_shining(vpls[first:end]) for first, end in itertools.pairwise(starts)]
     ranges: Ints = np.column_stack([starts[:-1], ends]) - start

@@ -20,6 +20,8 @@ from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output
 from deferred_ir.vpls.interleaving import SharesMeta, deal, find_share_starts
 
+BLOCK = np.dtype("i4")
+
 
 @dataclass(frozen=True)
 class Params:
@@ -35,14 +37,18 @@ class Interleave(Pass):
     inputs: ClassVar[Mapping[str, Input]] = {"vpls": Input("the VPLs", format="vpl")}
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """A buffer of as many VPLs."""
+        """A buffer of as many VPLs, and how they are dealt, for passes that do not change with the VPLs."""
         vpls, n = inputs["vpls"], self.params.n
         assert isinstance(vpls, Buffer)
         if n & (n - 1):
             raise GraphError(f"n {n}: wants 1, 2, 4 or 8")
         dealt = replace(vpls, format="share", parts=n * n)
-        defines = {**DEFINES, "INTERLEAVE": n}
-        return {"dealt": Output("the VPLs in the order of their shares", dealt, defines, meta=SharesMeta(n))}
+        edge = {"INTERLEAVE": n}
+        block = Buffer("block", 1, BLOCK.itemsize, parts=n * n)
+        return {
+            "dealt": Output("the VPLs in the order of their shares", dealt, {**DEFINES, **edge}, meta=SharesMeta(n)),
+            "block": Output("edge of a block of pixels: how the VPLs are dealt", block, edge, meta=SharesMeta(n)),
+        }
 
     def state_facts(self, facts: Facts) -> Statements:
         """State into how many shares the VPLs are dealt."""
@@ -65,6 +71,7 @@ class Interleave(Pass):
         order = deal(vpls["tile"].astype(int), capacity.records)
         parts = np.union1d(find_share_starts(len(vpls), self.params.n), np.arange(0, len(vpls), capacity.block))
         io["dealt"].write(put_shining_first(vpls[order], parts))
+        io["block"].write(np.array([self.params.n], BLOCK))
 
 
 PASS = Interleave

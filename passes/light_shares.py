@@ -67,7 +67,10 @@ class Interleaved(Pass):
                 if not begins and not count:
                     continue
                 first -= number * block
-                (ctx.disable if begins else ctx.enable)(ctx.BLEND)  # what begins a share writes all of its pixels
+                if begins:  # the first draw of a share writes all of its pixels
+                    ctx.disable(ctx.BLEND)
+                else:
+                    ctx.enable(ctx.BLEND)
                 program.set(share=(share % n, share // n), begins=begins, first=first, end=first + count)
                 if io["rays"]:
                     program.set(before=number * block - start)

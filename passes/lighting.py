@@ -44,7 +44,7 @@ class Lighting(Pass):
         "spotlight": Input("irradiance from the spotlight over its emission, instead of a map", "r32f", optional=True),
         "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
         "indirect": Input("irradiance from the VPLs, instead of adding them up", format="rgba32f", optional=True),
-        "thin": Input("irradiance where the filter has left it out", format="rgba32f", optional=True),
+        "lonely": Input("irradiance of lonely pixels that the filter has left out", format="rgba32f", optional=True),
         "views": Input("where the direct lights' maps are", format="view", optional=True),
         "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
         "blockers": Input("the same maps: what hides a part of the spotlight's disc", format="depth32f", optional=True),

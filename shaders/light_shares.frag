@@ -1,6 +1,5 @@
 // Irradiance from VPLs first to end of a block, on the pixels of one share, in its sub-buffer.
-#include "lib/camera/frame.glsl"
-#include "lib/surface/gbuffer.glsl"
+#include "lib/surface/pixel.glsl"
 #include "lib/lights/vpl.glsl"
 #include "lib/shares/places.glsl"
 #if HAS_RAYS
@@ -22,14 +21,14 @@ uniform int first;
 uniform int end;
 uniform int before;  // of VPLs of its share before this block; below 0 where the block begins with those of others
 
-layout(location = 0) out vec4 irradiance;  // alpha: the shading normal, for the filter
+layout(location = 0) out vec4 irradiance;
 
 // Of VPL i of the block.
-float visibility(int i, vec3 position, vec3 normal) {
+float visibility(int i, Pixel p) {
 #if HAS_RAYS
     return ray_visibility(before + i);
 #elif HAS_SHADOWS
-    return vpl_visibility(shadows, vpls[i], position, normal);
+    return vpl_visibility(shadows, vpls[i], p.position, p.normal);
 #else
     return 1.0;
 #endif
@@ -43,16 +42,13 @@ void main() {
         irradiance = vec4(0.0);
         return;
     }
-    vec3 position = unproject((vec2(pixel) + 0.5) / vec2(size) * 2.0 - 1.0, d);
-    vec4 code = texelFetch(normals, pixel, 0);
-    vec3 shading_normal, normal;
-    decode_normals(code, shading_normal, normal);
+    Pixel p = read_pixel(normals, pixel, centre_ndc(pixel, size), d);
     vec3 sum = vec3(0.0);
     for (int i = first; i < end; ++i)
-        sum += vpl_irradiance(vpls[i], position, normal, shading_normal) * visibility(i, position, normal);
+        sum += vpl_irradiance(vpls[i], p.position, p.normal, p.shading_normal) * visibility(i, p);
     sum *= float(INTERLEAVE * INTERLEAVE);
 #if HAS_NEAR_FIELD
     if (begins) sum += texelFetch(near_field, pixel, 0).rgb;  // to be filtered with the rest
 #endif
-    irradiance = vec4(sum, begins ? pack_normal(code.xy) : 0.0);
+    irradiance = vec4(sum, 0.0);
 }

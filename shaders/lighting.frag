@@ -1,6 +1,5 @@
 // Radiance from the direct lights and one block of VPLs; further blocks are added by blending.
-#include "lib/camera/frame.glsl"
-#include "lib/surface/gbuffer.glsl"
+#include "lib/surface/pixel.glsl"
 #include "lib/lights/spot.glsl"
 #include "lib/lights/vpl.glsl"
 #if HAS_SHADOWS
@@ -21,8 +20,8 @@ layout(binding = UNIT_SPOTLIGHT) uniform sampler2D spotlight;
 #endif
 #if HAS_INDIRECT
 layout(binding = UNIT_INDIRECT) uniform sampler2D indirect;
-#if HAS_THIN
-layout(binding = UNIT_THIN) uniform sampler2D thin;
+#if HAS_LONELY
+layout(binding = UNIT_LONELY) uniform sampler2D lonely;
 #endif
 #elif HAS_NEAR_FIELD
 layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
@@ -33,19 +32,19 @@ uniform int count;   // VPLs of the block, where they are not in `indirect` alre
 in vec2 ndc;
 layout(location = 0) out vec4 radiance;
 
-float visibility(DirectLight light, vec3 position, vec3 normal) {
+float visibility(DirectLight light, Pixel p) {
 #if !HAS_SHADOWS
     return 1.0;
 #elif HAS_BLOCKERS && SOFT && DISC
-    return light_visibility(shadows, blockers, light, position, normal);
+    return light_visibility(shadows, blockers, light, p.position, p.normal);
 #else
-    return light_visibility(shadows, light, position, normal);
+    return light_visibility(shadows, light, p.position, p.normal);
 #endif
 }
 
-float visibility(Vpl vpl, vec3 position, vec3 normal) {
+float visibility(Vpl vpl, Pixel p) {
 #if HAS_SHADOWS
-    return vpl_visibility(shadows, vpl, position, normal);
+    return vpl_visibility(shadows, vpl, p.position, p.normal);
 #else
     return 1.0;
 #endif
@@ -58,29 +57,25 @@ void main() {
         radiance = vec4(0.0);
         return;
     }
-    vec3 position = unproject(ndc, d);
-    vec4 code = texelFetch(normals, pixel, 0);
-    vec3 shading_normal, normal;
-    decode_normals(code, shading_normal, normal);
+    Pixel p = read_pixel(normals, pixel, ndc, d);
     vec3 irradiance = vec3(0.0);
 #if HAS_SPOTLIGHT
     if (direct > 0) irradiance = lights[0].emission * texelFetch(spotlight, pixel, 0).r;
 #else
     for (int i = 0; i < direct; ++i)
-        irradiance += spot_irradiance(lights[i], position, normal, shading_normal)
-                    * visibility(lights[i], position, normal);
+        irradiance += spot_irradiance(lights[i], p.position, p.normal, p.shading_normal) * visibility(lights[i], p);
 #endif
 #if HAS_INDIRECT  // with the near field in it
     irradiance += texelFetch(indirect, pixel, 0).rgb;
-#if HAS_THIN
-    irradiance += texelFetch(thin, pixel, 0).rgb;
+#if HAS_LONELY
+    irradiance += texelFetch(lonely, pixel, 0).rgb;
 #endif
 #else
 #if HAS_NEAR_FIELD
     if (direct > 0) irradiance += texelFetch(near_field, pixel, 0).rgb;
 #endif
     for (int i = 0; i < count; ++i)
-        irradiance += vpl_irradiance(vpls[i], position, normal, shading_normal) * visibility(vpls[i], position, normal);
+        irradiance += vpl_irradiance(vpls[i], p.position, p.normal, p.shading_normal) * visibility(vpls[i], p);
 #endif
     radiance = vec4(texelFetch(albedo, pixel, 0).rgb * irradiance * INVERSE_PI, 1.0);
 }

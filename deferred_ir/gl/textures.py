@@ -107,7 +107,7 @@ class GpuTexture:
 
     def bind_image(self, unit: int) -> None:
         """Let shaders load and store its texels through image `unit`."""
-        self.gpu.gl.BindImageTexture(unit, self.glo, 0, 0, 0, raw.READ_WRITE, self.format.internal)
+        self.gpu.gl.BindImageTexture(unit, self.glo, 0, bool(self.layers), 0, raw.READ_WRITE, self.format.internal)
 
     def read(self) -> np.ndarray:
         """Return all texels, (H, W, channels) or (layers, H, W, channels), bottom row first."""

@@ -65,6 +65,14 @@ def find_places(pixel: Ints, size: tuple[int, int], n: int) -> tuple[Ints, Ints]
     return y % n * n + x % n, (rows[y % n] + y // n) * width + columns[x % n] + x // n
 
 
+def choose_window_side(seed: int) -> tuple[int, int]:
+    """Return on which side in x and in y the filter's even window has a pixel more: 0 before its centre, 1 behind it.
+
+    Frames with fresh seeds go through all four, so that their mean is not off centre.
+    """
+    return seed & 1, seed >> 1 & 1
+
+
 def _split(length: int, n: int) -> list[tuple[int, int]]:
     """Return start and length of the interval that holds every n-th of `length` pixels, for each of the n offsets."""
     whole, rest = divmod(length, n)

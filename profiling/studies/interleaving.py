@@ -47,7 +47,7 @@ def compare(scene: Scene, vpls: int) -> list[dict[str, Any]]:
         plans = {n: one.plan(scene, vpls, ["radiance"]) for n, one in renderers.items()}
         images = {n: one.render(scene, vpls=vpls).radiance for n, one in renderers.items()}
         times = time_frames(scene, renderers, plans, TURNS, label=f"{scene.name}, {vpls} VPLs")
-        lonely = {n: int(_read(renderers[n], "gather", "count").item()) for n in BLOCKS}
+        lonely = {n: int(_read(renderers[n], "neighbours", "lonely_count").item()) for n in BLOCKS}
         hit = _read(renderers[BLOCKS[0]], "gbuffer", "depth")[::-1, :, 0] > 0
 
     def ms(n: int, name: str) -> float:
@@ -59,7 +59,8 @@ def compare(scene: Scene, vpls: int) -> list[dict[str, Any]]:
             "vpls": vpls,
             "n": n,
             "all_ms": ms(0, "lighting"),
-            **{name: ms(n, name) for name in ("light_shares", "gather")},
+            "light_shares": ms(n, "light_shares"),
+            "gather": ms(n, "neighbours") + ms(n, "gather"),
             "lonely": lonely[n] / hit.sum(),
             "relmse": relmse(images[n], images[0], hit)[0],
             "energy": float(images[n][hit].mean() / images[0][hit].mean()),

@@ -1,6 +1,5 @@
-// VPLs of a block whose shares are missing at a pixel of the list; added to what is known there.
-#include "lib/camera/frame.glsl"
-#include "lib/surface/gbuffer.glsl"
+// Adds the light of a block's VPLs in the shares that a lonely pixel misses.
+#include "lib/surface/pixel.glsl"
 #include "lib/lights/vpl.glsl"
 #include "lib/shares/lonely.glsl"
 #if HAS_SHADOWS
@@ -11,12 +10,15 @@ layout(binding = UNIT_SHADOWS) uniform sampler2DArrayShadow shadows;
 
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
+layout(binding = UNIT_LONELY_PIXELS) uniform usampler2D lonely_pixels;
+layout(binding = UNIT_LONELY_COUNT) uniform usampler2D lonely_count;
+layout(binding = UNIT_MISSING) uniform usampler2D missing;
 layout(binding = 0, rgba32f) uniform image2D irradiance;
 uniform ivec2 ranges[INTERLEAVE * INTERLEAVE];  // where in the block the VPLs of each share begin and end
 
-float visibility(Vpl vpl, vec3 position, vec3 normal) {
+float visibility(Vpl vpl, Pixel p) {
 #if HAS_SHADOWS
-    return vpl_visibility(shadows, vpl, position, normal);
+    return vpl_visibility(shadows, vpl, p.position, p.normal);
 #else
     return 1.0;
 #endif
@@ -24,20 +26,17 @@ float visibility(Vpl vpl, vec3 position, vec3 normal) {
 
 void main() {
     ivec2 place = ivec2(gl_FragCoord.xy), size = textureSize(depth, 0);
-    if (uint(place.y * size.x + place.x) >= imageLoad(count, ivec2(0)).r) return;
-    ivec2 pixel = thin_place(imageLoad(thin, place).r, size.x);
-    vec3 position = unproject((vec2(pixel) + 0.5) / vec2(size) * 2.0 - 1.0, texelFetch(depth, pixel, 0).r);
-    vec4 code = texelFetch(normals, pixel, 0);
-    vec3 shading_normal, normal;
-    decode_normals(code, shading_normal, normal);
+    if (uint(place.y * size.x + place.x) >= texelFetch(lonely_count, ivec2(0), 0).r) return;
+    ivec2 pixel = pixel_of(texelFetch(lonely_pixels, place, 0).r, size.x);
+    Pixel p = read_pixel(normals, pixel, centre_ndc(pixel, size), texelFetch(depth, pixel, 0).r);
     vec3 sum = vec3(0.0);
-    uvec2 bits = imageLoad(missing, pixel).rg;
+    uvec2 bits = texelFetch(missing, place, 0).rg;
     const int shares = INTERLEAVE * INTERLEAVE;
     for (int share = 0; share < shares; ++share) {
         bool wanted = ((bits[share >> 5] >> (share & 31)) & 1u) == 1u;
         int end = wanted ? ranges[share].y : 0;  // nothing is looped over where no pixel wants it
         for (int i = ranges[share].x; i < end; ++i)
-            sum += vpl_irradiance(vpls[i], position, normal, shading_normal) * visibility(vpls[i], position, normal);
+            sum += vpl_irradiance(vpls[i], p.position, p.normal, p.shading_normal) * visibility(vpls[i], p);
     }
     imageStore(irradiance, pixel, imageLoad(irradiance, pixel) + vec4(sum, 0.0));
 }

@@ -1,4 +1,6 @@
 // One triangle that covers the target, and the exposure, which is the same for all of it.
+#include "lib/colour.glsl"
+
 layout(binding = UNIT_RADIANCE) uniform sampler2D radiance;
 #ifndef AUTOMATIC
 uniform bool automatic;
@@ -18,9 +20,9 @@ float automatic_exposure() {
     for (int y = 0; y < grid.y; ++y)
         for (int x = 0; x < grid.x; ++x) {
             vec3 c = texelFetch(radiance, (ivec2(x, y) * 2 + 1) * size / (2 * grid), 0).rgb;
-            float luminance = dot(c, vec3(0.2126, 0.7152, 0.0722));
-            sum += luminance;
-            lit += float(luminance > 0.0);
+            float bright = luminance(c);
+            sum += bright;
+            lit += float(bright > 0.0);
         }
     // Nothing lit: nothing to expose for. Of hardly anything the quotient overflows, and infinity times 0 is no number.
     return sum > 0.0 ? min(MIDDLE_GREY * lit / sum, 1e37) : 1.0;

@@ -1,4 +1,6 @@
 // Exposure, tone curve, sRGB.
+#include "lib/colour.glsl"
+
 layout(binding = UNIT_RADIANCE) uniform sampler2D radiance;
 #ifndef OPERATOR
 uniform int operator_number;  // neutral, reinhard, aces, none
@@ -7,10 +9,6 @@ uniform int operator_number;  // neutral, reinhard, aces, none
 
 layout(location = 0) out vec4 color;
 flat in float exposure;
-
-float luminance(vec3 c) {
-    return dot(c, vec3(0.2126, 0.7152, 0.0722));
-}
 
 // Khronos PBR Neutral: colours below 0.8 - 0.04 keep their value, brighter ones bend towards white.
 vec3 neutral(vec3 c) {

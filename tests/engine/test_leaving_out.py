@@ -93,13 +93,15 @@ def test_without_vpls_nothing_is_cast_shared_or_filtered(renderer, graph):
     image = one.render(room(), vpls=0)
     assert one._tracer is None or graph == "accurate"
     plan = one.plan(room(), 0)
-    assert not {"light_shares", "gather", "near_field", "thin_rays"} & {step.name for step in plan.steps}
+    assert not {"light_shares", "gather", "near_field", "neighbours", "light_lonely_pixels"} & {
+        step.name for step in plan.steps
+    }
     full = renderer(SIZE, graph, keep_all=True)
     assert same_pixels(image, full.render(room(), vpls=0))
     if graph != "forward":
         assert one.executor.counters["maps_drawn"] in (0, 1)
     kept = full.plan(room(), 0)
-    assert set(kept.left_out) <= {"shadow_rays", "thin_rays", "shadow_maps", "interleave"}
+    assert set(kept.left_out) <= {"shadow_rays", "light_lonely_pixels", "shadow_maps", "interleave"}
 
 
 @pytest.mark.parametrize("graph", ["deferred", "interleaved", "accurate", "forward"])

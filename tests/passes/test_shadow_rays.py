@@ -76,12 +76,12 @@ def test_places_are_those_of_the_sub_buffers():
         assert (row.min(), row.max(), column.min(), column.max()) == (y, y + height - 1, x, x + width - 1)
 
 
-def test_thin_things_ask_the_missing_vpls(renderer):
-    """Where no neighbour counts every pixel is a thin thing, and the picture is the reference's."""
+def test_lonely_pixels_ask_the_missing_vpls(renderer):
+    """Where no neighbour counts every pixel is lonely, and the picture is the reference's."""
     scene = crooked_room()
-    one, _ = drawn(renderer, scene, 40, **{"gather.fewest": 1.0, "gather.angle": 0.0, "vpl.clamp": 0.0})
+    one, _ = drawn(renderer, scene, 40, **{"neighbours.fewest": 1.0, "neighbours.angle": 0.0, "vpl.clamp": 0.0})
     known, asked = (
-        read(one, source)[::-1, :, :3] for source in (("gather", "irradiance"), ("thin_rays", "irradiance"))
+        read(one, source)[::-1, :, :3] for source in (("gather", "irradiance"), ("light_lonely_pixels", "irradiance"))
     )
     image = known + asked
     assert asked.mean() > 0.9 * image.mean()

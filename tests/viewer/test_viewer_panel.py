@@ -154,7 +154,7 @@ def test_a_graph_of_ones_own_is_saved_whole(viewer, tmp_path, monkeypatch):
     own.parent.mkdir()
     own.write_text('extends = "interleaved"\n[passes.interleave]\nn = 2\n[passes.tonemap]\noperator = "aces"\n')
     viewer.session.change(str(own), FEW)
-    viewer.session.adjust("gather.angle", 12.0)
+    viewer.session.adjust("neighbours.angle", 12.0)
     viewer.frame()
     act(viewer, "key", "ctrl+s")
     assert viewer.session.error == ""

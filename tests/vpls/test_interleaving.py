@@ -95,10 +95,10 @@ def test_the_filter_is_what_it_says(renderer, n, size):
     irradiance = read_port(one, "gather.irradiance")[..., :3]
     depth, normals = read_port(one, "gbuffer.depth")[..., 0], read_port(one, "gbuffer.normals")
     shares = read_port(one, "light_shares.shares")[..., :3]
-    expected, thin = gather_by_definition(scene, n, 0.5, shares, (depth, normals))
-    listed = read_port(one, "gather.thin").ravel()[: read_port(one, "gather.count").item()]
-    assert sorted(listed) == np.flatnonzero(thin).tolist()
-    np.testing.assert_allclose(irradiance[~thin], expected[~thin], rtol=2e-5, atol=1e-6)
+    expected, lonely = gather_by_definition(scene, n, 0.5, shares, (depth, normals))
+    listed = read_port(one, "neighbours.lonely_pixels").ravel()[: read_port(one, "neighbours.lonely_count").item()]
+    assert sorted(listed) == np.flatnonzero(lonely).tolist()
+    np.testing.assert_allclose(irradiance[~lonely], expected[~lonely], rtol=2e-5, atol=1e-6)
 
 
 def gather_by_definition(scene, n, fewest, shares, gbuffer):
@@ -110,7 +110,7 @@ def gather_by_definition(scene, n, fewest, shares, gbuffer):
     for image, values in ((position, seen.position), (normal, seen.normal), (shading, seen.shading_normal)):
         image.reshape(-1, 3)[seen.pixel] = values
     rectangles = find_sub_buffers((width, height), n)
-    result, thin = np.zeros((height, width, 3)), np.zeros((height, width), bool)
+    result, lonely = np.zeros((height, width, 3)), np.zeros((height, width), bool)
 
     def neighbour(x, y, i, j):
         if not (0 <= i < width and 0 <= j < height and depth[j, i] > 0):
@@ -130,13 +130,13 @@ def gather_by_definition(scene, n, fewest, shares, gbuffer):
         window = [(i, j) for j in range(low, low + n) for i in range(left, left + n)]
         found = [neighbour(x, y, i, j) for i, j in window]
         if sum(value is not None for value in found) <= fewest * n * n:  # one at least is missing
-            thin[y, x] = True
+            lonely[y, x] = True
             continue
         for k, (i, j) in enumerate(window):
             for to in ((moved(i, x), j), (i, moved(j, y)), (moved(i, x), moved(j, y))):
                 found[k] = neighbour(x, y, *to) if found[k] is None else found[k]
         result[y, x] = np.mean([value for value in found if value is not None], axis=0)
-    return result, thin
+    return result, lonely
 
 
 @pytest.mark.parametrize("vpls", [3, 100])
@@ -249,7 +249,7 @@ def test_foliage_has_no_holes(renderer):
     scene = build(plane(2.0, -1.0), make_leaves(6000), camera=Camera((0.0, 1.0, 3.5), (0.0, 0.0, 0.0), fov=45.0))
     full, shared, one = render_both(renderer, scene, 64, (96, 80))
     hit = read_port(one, "gbuffer.depth")[::-1, :, 0] > 0
-    assert read_port(one, "gather.count").item() > 0.2 * hit.sum()
+    assert read_port(one, "neighbours.lonely_count").item() > 0.2 * hit.sum()
     lit = full.max(axis=-1) > 0.1 * full[hit].mean()
     assert (shared[lit].max(axis=-1) > 0).mean() > 0.995
     assert rel_mse(shared, full, hit, trim=1e-3) < 0.05
@@ -260,18 +260,18 @@ def test_foliage_has_no_holes(renderer):
 @pytest.mark.parametrize("n", [2, 4, 8])
 def test_where_no_neighbour_counts_it_is_the_deferred_image(renderer, n):
     """Pixels ask for all shares but, at most, their own, in several blocks of the buffer."""
-    settings = {"gather__angle": 0.0, "gather__fewest": 1.0, "interleave__n": n}
+    settings = {"neighbours__angle": 0.0, "neighbours__fewest": 1.0, "interleave__n": n}
     full, shared, one = render_both(renderer, crooked_room(), 300, (64, 48), **settings)
-    assert read_port(one, "gather.count").item() == 64 * 48
+    assert read_port(one, "neighbours.lonely_count").item() == 64 * 48
     assert_same_but_for_edges(shared, full)
 
 
 def test_the_more_pixels_ask_the_missing_vpls_the_less_the_error(renderer):
     scene, errors, asked = load("atrium"), [], []
     for fewest in (0.0, 0.5, 1.0):
-        full, shared, one = render_both(renderer, scene, 64, (96, 96), gather__fewest=fewest)
+        full, shared, one = render_both(renderer, scene, 64, (96, 96), neighbours__fewest=fewest)
         errors.append(rel_mse(shared, full, full.max(axis=-1) > 0, trim=1e-3))
-        asked.append(read_port(one, "gather.count").item())
+        asked.append(read_port(one, "neighbours.lonely_count").item())
     assert asked == sorted(asked)
     assert errors[2] < 0.7 * errors[1] < 0.5 * errors[0]
 
@@ -289,4 +289,4 @@ def test_it_adds_little_error_on_built_in_scenes(renderer, name, bound):
 def test_a_surface_with_smooth_normals_is_no_edge(renderer):
     _, _, one = render_both(renderer, build(sphere(), camera=Camera((0, 0, 3), (0, 0, 0), fov=45.0)), 16, (96, 96))
     depth = read_port(one, "gbuffer.depth")[..., 0]
-    assert read_port(one, "gather.count").item() < 0.1 * (depth > 0).sum()
+    assert read_port(one, "neighbours.lonely_count").item() < 0.1 * (depth > 0).sum()

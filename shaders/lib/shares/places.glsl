@@ -13,14 +13,3 @@ ivec2 split_place(ivec2 pixel, ivec2 size) {
 ivec2 whole_place(ivec2 place, ivec2 share, ivec2 size) {
     return (place - part_start(share, size)) * INTERLEAVE + share;
 }
-
-// The code of a normal (lib/surface/gbuffer.glsl) as a whole number below 2^24, which a float holds exactly.
-float pack_normal(vec2 code) {
-    vec2 steps = floor(code * 4095.0 + 0.5);
-    return steps.x * 4096.0 + steps.y;
-}
-
-vec2 unpack_normal(float number) {
-    float x = floor(number * (1.0 / 4096.0));
-    return vec2(x, number - x * 4096.0) * (1.0 / 4095.0);
-}

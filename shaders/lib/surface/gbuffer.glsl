@@ -37,3 +37,8 @@ void decode_normals(vec4 code, out vec3 shading, out vec3 geometric) {
 vec4 encode_normals(vec3 shading, vec3 geometric) {
     return vec4(octahedral(shading), octahedral(geometric));
 }
+
+// The code of a normal, rounded to 12 bits.
+vec2 round_normal(vec2 code) {
+    return floor(code * 4095.0 + 0.5) * (1.0 / 4095.0);
+}

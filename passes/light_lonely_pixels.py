@@ -1,4 +1,4 @@
-"""Light by the missing VPLs, with shadow rays, pixels for which `gather` found too few neighbours: thin -> irradiance.
+"""Light lonely pixels by the VPLs that they miss, with shadow rays: lonely pixels, vpls, G-buffer -> irradiance.
 
 Where VPLs have no maps. The list is read back, and the reference's own sum is made for its pixels on the CPU.
 """
@@ -24,15 +24,15 @@ from deferred_ir.vpls.interleaving import find_share_starts
 from deferred_ir.vpls.ray_sum import ScaledSurfaces, ScaledVpls
 
 
-class ThinRays(Pass):
-    """Irradiance from the missing VPLs at the pixels of a list."""
+class LightLonelyPixels(Pass):
+    """Irradiance of lonely pixels from the VPLs of the shares that they miss."""
 
     inputs: ClassVar[Mapping[str, Input]] = {
         "vpls": Input("the VPLs", format="share"),
         "rays": Input("which VPLs are seen: connected where they have no maps", format="r32ui"),
-        "thin": Input("numbers of the pixels", format="r32ui"),
-        "count": Input("how many", format="r32ui"),
-        "missing": Input("bits of the shares that each pixel asks for", format="rg32ui"),
+        "lonely_pixels": Input("numbers of the pixels with too few neighbours", format="r32ui"),
+        "missing": Input("bits of the shares that each of them lacks", format="rg32ui"),
+        "lonely_count": Input("how many there are", format="r32ui"),
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
     }
@@ -54,10 +54,10 @@ class ThinRays(Pass):
         """Read back, trace, upload."""
         width, height = frame.size
         vpls, parts = io["vpls"].records, io["vpls"].description.parts
-        count = int(io["count"].read()[0, 0, 0])
+        count = int(io["lonely_count"].read()[0, 0, 0])
         bits = np.zeros((height * width, 2), np.uint32)
-        listed = io["thin"].read().reshape(-1)[:count]
-        bits[listed] = io["missing"].read().reshape(-1, 2)[listed]
+        listed = io["lonely_pixels"].read().reshape(-1)[:count]
+        bits[listed] = io["missing"].read().reshape(-1, 2)[:count]
         seen = frame.read_surfaces(io["depth"], io["normals"])
         asking = seen.rows(np.flatnonzero(bits[seen.pixel].any(axis=1)))
         image = np.zeros((height * width, 4), np.float32)
@@ -67,7 +67,7 @@ class ThinRays(Pass):
 
 
 def _irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, parts: int) -> Array:
-    """Of surfaces (n), from those of `parts` shares of the VPLs (VPL records) that have a bit in bits (n, 2)."""
+    """Return irradiance (n, 3) of `seen` from those of `parts` shares of the VPLs that have a bit in `bits` (n, 2)."""
     geometry = tracer.scene.geometry
     scaled = ScaledVpls.from_vpls(tracer, read_vpls(vpls), read_limits(vpls))
     starts = find_share_starts(len(vpls), round(parts**0.5)).tolist()
@@ -87,4 +87,4 @@ def _irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, pa
     return irradiance
 
 
-PASS = ThinRays
+PASS = LightLonelyPixels

@@ -1,0 +1,106 @@
+// Which pixels of the window of INTERLEAVE^2 pixels, or on the other side of the pixel, lie on the pixel's own surface;
+// and the list of lonely pixels, for which too few do.
+#include "lib/camera/frame.glsl"
+#include "lib/surface/gbuffer.glsl"
+#include "lib/shares/places.glsl"
+#include "lib/shares/window.glsl"
+#include "lib/shares/lonely.glsl"
+
+layout(binding = UNIT_DEPTH) uniform sampler2D depth;
+layout(binding = UNIT_NORMALS) uniform sampler2D normals;
+layout(location = TARGET_WINDOW) out uvec4 first_group;  // layer 0 of `window`
+layout(binding = 0, rg32ui) uniform writeonly uimage2DArray window;  // the other layers
+layout(binding = 1, r32ui) uniform writeonly uimage2D lonely_pixels;
+layout(binding = 2, rg32ui) uniform writeonly uimage2D missing;
+layout(binding = 3, r32ui) uniform uimage2D lonely_count;
+uniform float cosine_squared;  // of the largest angle between normals, at most 90 degrees
+uniform float sine_squared;    // of the largest angle off the pixel's plane
+uniform float fewest;          // taps; with no more the pixel is lonely
+
+in vec2 ndc;
+
+struct Centre {
+    ivec2 pixel, size;
+    float depth;
+    vec3 ray, across, up;  // the pixel's ray, and how rays change from pixel to pixel
+    vec3 normal, shading_normal;
+};
+
+Centre read_centre(ivec2 pixel, ivec2 size) {
+    Centre c;
+    c.pixel = pixel;
+    c.size = size;
+    c.depth = texelFetch(depth, pixel, 0).r;
+    decode_normals(texelFetch(normals, pixel, 0), c.shading_normal, c.normal);
+    c.across = frame.ray[0].xyz * (2.0 / float(size.x));
+    c.up = frame.ray[1].xyz * (2.0 / float(size.y));
+    c.ray = frame.ray[0].xyz * ndc.x + frame.ray[1].xyz * ndc.y + frame.ray[2].xyz;
+    return c;
+}
+
+// Whether the pixel `other` lies in the frame and on the same surface.
+bool counts(Centre c, ivec2 other) {
+    float d = texelFetch(depth, other, 0).r;
+    vec2 away = vec2(other - c.pixel);
+    // From the centre's point to the other's, times both depths / near: no division, and 0 for the centre itself.
+    vec3 off = (c.ray + c.across * away.x + c.up * away.y) * c.depth - c.ray * d;
+    float height = dot(c.normal, off);
+    vec3 n = octahedron(round_normal(texelFetch(normals, other, 0).xy));
+    float likeness = dot(c.shading_normal, n);
+    bool inside = all(lessThan(uvec2(other), uvec2(c.size)));
+    return inside && d > 0.0 && likeness >= 0.0 && likeness * likeness >= cosine_squared * dot(n, n)
+        && height * height <= sine_squared * dot(off, off);
+}
+
+// Sets of up to 64 numbers, in words of 32 bits.
+const int WORDS = (TAPS + 31) / 32;
+const uint ALL = TAPS < 32 ? (1u << (TAPS & 31)) - 1u : ~0u;  // of a word
+
+uvec2 only(int number) {
+    uint one = 1u << (number & 31);
+    return TAPS > 32 ? uvec2(number < 32 ? one : 0u, number < 32 ? 0u : one) : uvec2(one, 0u);
+}
+
+uvec4 group(int g, uvec2 found, uvec2 x, uvec2 y, bool lonely) {
+    uvec3 bits = uvec3(found[g >> 1], x[g >> 1], y[g >> 1]) >> (16 * (g & 1)) & 0xffffu;
+    return pack_group(WindowGroup(bits.x, bits.y, bits.z, lonely));
+}
+
+void write_window(ivec2 pixel, uvec2 found, uvec2 x, uvec2 y, bool lonely) {
+    first_group = group(0, found, x, y, lonely);
+    for (int g = 1; g < GROUPS; ++g) imageStore(window, ivec3(pixel, g), group(g, found, x, y, lonely));
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_FragCoord.xy), size = textureSize(depth, 0), corner = window_corner(pixel, size);
+    Centre c = read_centre(pixel, size);
+    uvec2 found = uvec2(0u), x = uvec2(0u), y = uvec2(0u);  // taps
+    if (c.depth <= 0.0) {  // background
+        write_window(pixel, found, x, y, false);
+        return;
+    }
+    for (int tap = 0; tap < TAPS; ++tap)
+        if (counts(c, tap_pixel(corner, tap))) found |= only(tap);
+    int number = bitCount(found.x) + bitCount(found.y);
+    bool lonely = float(number) <= fewest && number < TAPS;
+    uvec2 absent = uvec2(0u);  // shares
+    int tries = lonely ? 0 : 3;
+    for (int word = 0; word < WORDS; ++word)
+        for (uint gaps = ~found[word] & ALL; gaps != 0u; gaps &= gaps - 1u) {  // as often as the pixel with most gaps has
+            int tap = word * 32 + findLSB(gaps);
+            ivec2 other = tap_pixel(corner, tap), away = other_side(other, pixel), place = other % N;
+            absent |= only(place.y * N + place.x);
+            bool there = false;
+            for (int i = 0; i < tries && !there; ++i) {  // in x, in y, in both
+                there = counts(c, other + away * ivec2(i != 1, i != 0));
+                if (there && i != 1) x |= only(tap);
+                if (there && i != 0) y |= only(tap);
+            }
+        }
+    write_window(pixel, found, x, y, lonely);
+    if (lonely) {
+        ivec2 place = list_place(imageAtomicAdd(lonely_count, ivec2(0), 1u), size.x);
+        imageStore(lonely_pixels, place, uvec4(pixel.y * size.x + pixel.x));
+        imageStore(missing, place, uvec4(absent, 0u, 0u));
+    }
+}

@@ -9,7 +9,8 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.meshes.clusters import Clusters
-from deferred_ir.scene.geometry import Geometry, find_groups, find_middle, transform_points
+from deferred_ir.scene.geometry import Geometry
+from deferred_ir.scene.vertices import find_groups, find_middle, transform_points
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.errors import GraphError
 from deferred_ir.meshes.posed import MapMesh
-from deferred_ir.scene.geometry import find_middle
+from deferred_ir.scene.vertices import find_middle
 
 MOST = 2_000_000
 """Most triangles; more are refused before they are made."""

@@ -13,7 +13,8 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.errors import DeviceError
-from deferred_ir.scene.geometry import Geometry, find_middle
+from deferred_ir.scene.geometry import Geometry
+from deferred_ir.scene.vertices import find_middle
 
 INFINITE = 1e37
 """The length that stands for an unbounded ray."""

@@ -5,7 +5,6 @@ A model moves as a whole, so posing it changes the vertices and the normals of m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints, Vec3
 from deferred_ir.scene.motion import ModelMotion
+from deferred_ir.scene.vertices import compute_face_normals, find_bounds, find_groups, transform_points
 
 FAR = 4.0
 """A scene whose middle is farther from the origin than this many times its `scale` gets a `centre` of its own."""
@@ -140,7 +140,7 @@ class Geometry:
     @cached_property
     def face_normals(self) -> Array:
         """Unit geometric normals by winding, float64 (F, 3); +y for a degenerate face, which covers no pixel."""
-        return _compute_face_normals(self.positions, self.faces)
+        return compute_face_normals(self.positions, self.faces)
 
     @cached_property
     def bounds(self) -> Array:
@@ -254,7 +254,7 @@ class PosedGeometry(Geometry):
         """Unit geometric normals, float64 (F, 3); only those of moving models are computed."""
         normals = self._rest.face_normals.copy()
         for faces in self.faces_of_models:
-            normals[faces] = _compute_face_normals(self.positions, self.faces[faces])
+            normals[faces] = compute_face_normals(self.positions, self.faces[faces])
         return normals
 
     @cached_property
@@ -271,41 +271,3 @@ class PosedGeometry(Geometry):
     def spread(self) -> float:
         """The median distance of the corners of faces from the middle; the same at all times."""
         return self._rest.spread
-
-
-def find_bounds(points: Array) -> Array:
-    """Return the minimum and maximum of points (n, 3), (2, 3)."""
-    return np.stack([points.min(axis=0), points.max(axis=0)])
-
-
-def find_middle(points: Array) -> Array:
-    """Return the middle of the box around points (n, 3), (3,); 0 where there are none."""
-    return find_bounds(points).mean(axis=0) if len(points) else np.zeros(3)
-
-
-def transform_points(points: Array, matrix: Array) -> Array:
-    """Transform points (n, 3) by a rigid transform (4, 4), float64 (n, 3)."""
-    transformed: Array = points @ matrix[:3, :3].T + matrix[:3, 3]
-    return transformed
-
-
-def find_groups(faces: Ints, ranges: Sequence[slice]) -> Ints:
-    """Return the group of each of `faces` (F, 3), int (F,): i + 1 where its vertices lie in ranges[i], 0 elsewhere."""
-    groups = np.zeros(len(faces), np.intp)
-    for number, vertices in enumerate(ranges, start=1):
-        groups[(faces[:, 0] >= vertices.start) & (faces[:, 0] < vertices.stop)] = number
-    return groups
-
-
-def _compute_face_normals(positions: Array, faces: Ints) -> Array:
-    a, b, c = (positions[faces[:, i]] for i in range(3))
-    # Edges scaled to about 1 first: the product of two tiny edges must not underflow.
-    ab, ac = b - a, c - a
-    size = np.maximum(np.abs(ab).max(axis=1, initial=0), np.abs(ac).max(axis=1, initial=0))[:, None]
-    size[size == 0] = 1
-    cross = np.cross(ab / size, ac / size)
-    length = np.linalg.norm(cross, axis=1)
-    flat = length < 1e-30
-    cross[flat], length[flat] = (0, 1, 0), 1
-    normals: Array = cross / length[:, None]
-    return normals

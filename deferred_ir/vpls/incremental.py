@@ -22,8 +22,8 @@ from deferred_ir.sampling import streams
 from deferred_ir.sampling.disc_voronoi import VoronoiCells, find_most_crowded
 from deferred_ir.sampling.warps import build_basis
 from deferred_ir.sampling.warps import square_to_disc as unit_disc
-from deferred_ir.scene.geometry import transform_points
 from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.vertices import transform_points
 from deferred_ir.vpls.cast import Vpls
 from deferred_ir.vpls.emission_disc import EmissionDisc
 from deferred_ir.vpls.kernel import cosine_ratio

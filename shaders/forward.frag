@@ -1,7 +1,7 @@
 // Radiance from one direct light, or from LIGHTS_PER_DRAW VPLs or fewer, each with a depth map of its own; blending adds
 // up the draws.
 #include "lib/surface/surface.glsl"
-#include "lib/lights/spot.glsl"
+#include "lib/lights/direct.glsl"
 #include "lib/lights/vpl.glsl"
 #if HAS_LIGHT_MAPS && HAS_VPL_MAPS
 #include "lib/shadows/single.glsl"
@@ -32,7 +32,7 @@ void main() {
     Surface s = surface();
     vec3 irradiance = vec3(0.0);
 #if DIRECT
-    irradiance = spot_irradiance(lights[number], s.position, s.normal, s.shading_normal);
+    irradiance = light_irradiance(lights[number], s.position, s.normal, s.shading_normal);
 #if HAS_LIGHT_MAPS && HAS_BLOCKERS && SOFT && DISC
     irradiance *= light_visibility(light_maps, blockers, lights[number], s.position, s.normal);
 #elif HAS_LIGHT_MAPS

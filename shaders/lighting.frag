@@ -1,6 +1,6 @@
 // Radiance from the direct lights and one block of VPLs; further blocks are added by blending.
 #include "lib/surface/pixel.glsl"
-#include "lib/lights/spot.glsl"
+#include "lib/lights/direct.glsl"
 #include "lib/lights/vpl.glsl"
 #if HAS_SHADOWS
 #include "lib/shadows/atlas.glsl"
@@ -63,7 +63,7 @@ void main() {
     if (direct > 0) irradiance = lights[0].emission * texelFetch(spotlight, pixel, 0).r;
 #else
     for (int i = 0; i < direct; ++i)
-        irradiance += spot_irradiance(lights[i], p.position, p.normal, p.shading_normal) * visibility(lights[i], p);
+        irradiance += light_irradiance(lights[i], p.position, p.normal, p.shading_normal) * visibility(lights[i], p);
 #endif
 #if HAS_INDIRECT  // with the near field in it
     irradiance += texelFetch(indirect, pixel, 0).rgb;

@@ -20,7 +20,7 @@ LIGHT = np.dtype(
         ("view", "f4"),  # number of its first view in the buffer of views
     ]
 )
-"""One direct light in a std140 uniform block; shaders/lib/lights/spot.glsl declares the same three vec4."""
+"""One direct light in a std140 uniform block; shaders/lib/lights/direct.glsl declares the same three vec4."""
 
 BINDING = 2
 CAPACITY = 1

@@ -1,7 +1,7 @@
 // One light a pixel, drawn by a hash: what the shadow maps say of the pair, and how much light depends on it.
 #include "lib/camera/frame.glsl"
 #include "lib/surface/gbuffer.glsl"
-#include "lib/lights/spot.glsl"
+#include "lib/lights/direct.glsl"
 #include "lib/lights/vpl.glsl"
 #include "lib/shadows/atlas.glsl"
 #include "lib/shadows/light_visibility.glsl"
@@ -44,7 +44,7 @@ void main() {
     vec3 irradiance;
     float visible;
     if (direct) {
-        irradiance = spot_irradiance(lights[0], position, normal, shading_normal);
+        irradiance = light_irradiance(lights[0], position, normal, shading_normal);
         visible = light_visibility(shadows, lights[0], position, normal);
     } else {
         irradiance = vpl_irradiance(vpls[i], position, normal, shading_normal);

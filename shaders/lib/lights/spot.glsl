@@ -1,16 +1,5 @@
-// Direct lights (deferred_ir/frame/direct_lights.py): their records, and the irradiance from one without its shadow.
-#include "lib/lights/light.glsl"
-
-struct DirectLight {
-    vec3 position;
-    float one_minus_cos;  // 1 - cos of the half cone angle
-    vec3 axis;            // unit; where the light shines
-    float radius;         // of its disc
-    vec3 emission;
-    float view;           // number of its view in `views`
-};
-
-layout(std140, binding = LIGHTS_BINDING) uniform Lights { DirectLight lights[LIGHTS_PER_BLOCK]; };
+// Irradiance from a spotlight (deferred_ir/scene/lights/spot.py). lib/lights/direct.glsl, which includes this file,
+// declares the record.
 
 // I(w) = E cos(theta) cone(theta), cone = clamp(4 (cos theta - cos(fov/2)) / (1 - cos(fov/2)), 0, 1).
 vec3 spot_irradiance(DirectLight light, vec3 position, vec3 normal, vec3 shading_normal) {

@@ -1,5 +1,5 @@
 // The views of direct lights.
-#include "lib/lights/spot.glsl"
+#include "lib/lights/direct.glsl"
 #include "lib/shadows/view.glsl"
 
 layout(std140, binding = VIEWS_BINDING) uniform Views { View views[VIEWS_PER_BLOCK]; };

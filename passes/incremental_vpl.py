@@ -86,7 +86,7 @@ class IncrementalVpl(Pass):
     def execute(self, frame: Frame, io: Io) -> None:
         """Go on from what the last frame left, pack, upload."""
         light, p, state = frame.scene.spotlight, self.params, io.state
-        if p.count == 0 or not any(light.emission):
+        if p.count == 0 or not frame.scene.emits:
             state.vpls = None
             io["vpls"].write(pack_vpls(frame.scene, NONE, p, NONE.ray))
             return

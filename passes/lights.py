@@ -37,7 +37,9 @@ class Lights(Pass):
         versions = io.state.update(records, frame.scene)
         if frame.by_view and find_shining(records).any():
             seen = find_reaching(_list_cones(frame.scene), frame.buffers.clusters, frame.scene.camera, frame.size)
-            reaches = np.logical_or.reduceat(seen, records["view"].astype(int))
+            views = [len(light.list_views()) for light in frame.scene.lights]
+            light_of_view = np.repeat(np.arange(len(records)), views)
+            reaches = (np.bincount(light_of_view, seen, len(records)) > 0) | (np.array(views) == 0)
             records["emission"][~reaches] = 0
             io.count(LIGHTS_DROPPED.name, int((~reaches).sum()))
         io["lights"].write(records, versions)

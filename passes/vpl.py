@@ -61,8 +61,8 @@ class Vpl(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Cast, pack, upload."""
-        light, p = frame.scene.spotlight, self.params
-        vpls = self._cast(frame) if p.count > 0 and any(light.emission) else NONE
+        p = self.params
+        vpls = self._cast(frame) if p.count > 0 and frame.scene.emits else NONE
         records = pack_vpls(frame.scene, vpls, p, np.arange(len(vpls)))
         if frame.by_view and len(vpls):
             reaches = find_reaching(records, frame.buffers.clusters, frame.scene.camera, frame.size)

@@ -97,7 +97,7 @@ class Frame:
 
 PARTS: Mapping[str, Callable[[Frame], Any]] = {
     "camera": lambda frame: (frame.scene.camera, frame.size),
-    "light": lambda frame: frame.scene.spotlight,
+    "light": lambda frame: frame.scene.lights,
     "models": lambda frame: (
         frame.buffers,
         frame.scene.geometry,

@@ -93,12 +93,12 @@ def _trace(scene: Scene, tracer: Tracer, size: tuple[int, int], first: int, last
     material = np.where(hits.hit, scene.geometry.face_materials[hits.face], -1)
 
     light = scene.spotlight
-    to_light = np.asarray(light.position, float) - hits.position
+    sources = light.locate(None, len(hits.position))
+    to_light = sources - hits.position
     to_light /= np.maximum(np.linalg.norm(to_light, axis=1, keepdims=True), 1e-150)
-    lit = hits.hit & (np.einsum("ij,ij->i", to_light, hits.normal) > 0) & (light.cone(-to_light) > 0)
+    lit = hits.hit & (np.einsum("ij,ij->i", to_light, hits.normal) > 0) & (light.radiate(-to_light) > 0)
     rows = np.flatnonzero(lit)
-    sources = np.broadcast_to(np.asarray(light.position, float), (len(rows), 3))
-    lit[rows] = ~tracer.occluded(tracer.lift(hits.position[rows], hits.normal[rows]), sources)
+    lit[rows] = ~tracer.occluded(tracer.lift(hits.position[rows], hits.normal[rows]), sources[rows])
     values: tuple[Any, ...] = (hits.position, hits.normal, hits.shading_normal, hits.albedo, material, lit)
     return _Lattice(*(value.reshape(*shape, *value.shape[1:]) for value in values))
 

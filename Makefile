@@ -9,7 +9,7 @@ PIP    := $(BIN)/python -m pip install -qq --no-input --disable-pip-version-chec
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint types pixels pictures bench soak look clean
+.PHONY: help demo test quick lint types pixels pictures bench soak look clean
 
 help:  ## this list
 	@echo "deferred-ir: global illumination on OpenGL"
@@ -25,6 +25,10 @@ test: lint types  ## install, check style and types, run all tests
 	@$(BIN)/python tools/system.py opengl
 	@$(BIN)/python tools/system.py display
 	@$(BIN)/python -m pytest -n auto --maxprocesses 8 --dist loadfile
+
+quick: $(VENV)/installed-dev  ## lint, types, an image of each graph and the tests without OpenGL, in under a minute on two cores
+	@$(BIN)/python tools/system.py opengl
+	@$(BIN)/python tools/quick.py
 
 pixels: $(VENV)/installed  ## prove that a change moves no pixel: run it before and after; SCENES="a.toml b.toml" adds scenes
 	@$(BIN)/python tools/system.py opengl

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 from collections.abc import Callable, Iterator
 from typing import Any
 from unittest import mock
@@ -21,6 +22,39 @@ os.environ[SWITCH] = "1"  # OpenGL's complaints are errors, in every process tha
 # The same examples in every run, and no clocks: a busy machine must not fail a test.
 hypothesis.settings.register_profile("project", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("project")
+
+
+OPENGL_FIXTURES = {"software_gpu", "gpu", "renderer", "screen", "viewer_window", "viewer"}
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--quick", action="store_true", help="only tests without OpenGL, other processes and mark 'slow'")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """With --quick, leave out slow tests and those with fixtures that need OpenGL."""
+    if not config.getoption("--quick"):
+        return
+    chosen, others = [], []
+    for item in items:
+        slow = item.get_closest_marker("slow") or OPENGL_FIXTURES & set(getattr(item, "fixturenames", ()))
+        (others if slow else chosen).append(item)
+    config.hook.pytest_deselected(items=others)
+    items[:] = chosen
+
+
+@pytest.fixture(scope="session", autouse=True)
+def quick(request: pytest.FixtureRequest) -> Iterator[None]:
+    """With --quick, skip a test as soon as it opens an OpenGL context or starts a process."""
+    if not request.config.getoption("--quick"):
+        yield
+        return
+
+    def skip(*_: Any, **__: Any) -> None:
+        pytest.skip("--quick: needs OpenGL or another process")
+
+    with mock.patch.object(Gpu, "__init__", skip), mock.patch.object(subprocess.Popen, "__init__", skip):
+        yield
 
 
 @pytest.fixture(scope="session")

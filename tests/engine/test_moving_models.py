@@ -107,6 +107,7 @@ def away_moving(scene: Scene, by: tuple[float, float, float]) -> Scene:
 
 @settings(max_examples=40)
 @given(st.lists(st.tuples(VECTORS, VECTORS), min_size=2, max_size=2), st.integers(0, 2**31), st.booleans())
+@pytest.mark.slow
 def test_rays_meet_what_they_would_in_the_moved_scene(poses, seed, walls):
     meshes = (WALLS, BLOCK, BALL) if walls else (BLOCK, BALL)
     scene = build(*meshes, motions=(None, AROUND, UP)[3 - len(meshes) :])

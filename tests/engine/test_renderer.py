@@ -158,6 +158,7 @@ def test_closing_a_context_leaves_the_samplers_of_the_one_that_is_current():
     second.close()
 
 
+@pytest.mark.usefixtures("software_gpu")  # says that it needs OpenGL: its thread cannot
 def test_a_renderer_works_in_the_thread_that_made_it():
     found = []
 

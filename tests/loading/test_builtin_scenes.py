@@ -176,6 +176,7 @@ def test_atrium_colours_are_exact_in_the_file():
         assert material.albedo == pytest.approx(np.array(atrium.COLORS[material.name]) / 255, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_script_makes_the_committed_atrium(tmp_path):
     made = tmp_path / "made.glb"
     atrium.write(made)

@@ -300,6 +300,7 @@ TABLES = st.dictionaries(KEYS, VALUES | TRIPLES, max_size=6)
         optional={"camera": TABLES, "spotlight": TABLES, "render": TABLES, "name": VALUES},
     )
 )
+@pytest.mark.slow
 def test_any_tables_give_a_scene_or_one_line(tmp_path: Path, data: dict[str, object]) -> None:
     text = "\n".join(f"{key} = {to_toml(value)}" for key, value in data.items())
     try:

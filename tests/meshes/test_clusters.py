@@ -93,6 +93,7 @@ def clip_distances(light: np.ndarray, positions: np.ndarray, hemisphere: bool) -
     offset=st.sampled_from([0.0, 1.0, 1e4]),
     hemisphere=st.booleans(),
 )
+@pytest.mark.slow
 def test_what_is_left_out_lies_behind_one_plane_for_the_shader_too(seed, fov, scale, offset, hemisphere):
     mesh = triangle_soup(seed, 64, scale, offset * scale)
     clusters = Clusters(mesh.positions, mesh.faces, most=4)

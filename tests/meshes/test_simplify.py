@@ -71,6 +71,7 @@ KINDS = ["terrain", "folded", "plate", "ball", "tube", "soup"]
     deviation=st.floats(1e-4, 0.3),
     scale=st.sampled_from([1e-3, 1.0, 1e3]),
 )
+@pytest.mark.slow
 def test_both_surfaces_keep_to_the_deviation(kind, seed, deviation, scale):
     positions, faces = shape(kind, seed)
     faces = weld_vertices(positions, faces)

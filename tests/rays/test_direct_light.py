@@ -47,6 +47,7 @@ def test_a_point_light_is_exact(scene):
 
 
 @pytest.mark.parametrize("samples", [1, 5])
+@pytest.mark.slow
 def test_the_mean_over_seeds_is_the_soft_shadow(samples):
     """Everywhere: in penumbrae, and where the plane of a surface cuts the disc."""
     scene = soft()

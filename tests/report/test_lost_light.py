@@ -42,6 +42,7 @@ def test_the_share_of_a_cone_is_that_of_the_spheres_chords():
     assert found["wide_light"] == pytest.approx(-share, abs=0.004)
 
 
+@pytest.mark.slow
 def test_the_clamp_takes_more_the_larger_it_is():
     scene = room()
     losses = [lost_light.estimate(scene, Tracer(scene), clamp=c, fov=180)["clamp"] for c in (0.01, 0.05, 0.2, 5.0)]

@@ -36,6 +36,7 @@ def add_up_coincident(sites, areas):
 
 
 @given(sites())
+@pytest.mark.slow
 def test_areas_are_those_of_the_nearest_points(sites):
     areas = VoronoiCells(sites).areas()
     assert areas.min() >= 0
@@ -45,6 +46,7 @@ def test_areas_are_those_of_the_nearest_points(sites):
 
 
 @given(sites(), st.floats(0.1, 1.0))
+@pytest.mark.slow
 def test_no_point_of_the_disc_is_farther_from_all_sites(sites, radius):
     centre, distance = VoronoiCells(sites).find_emptiest_circle(radius)
     tree = cKDTree(sites)

@@ -180,12 +180,14 @@ def test_flip_keeps_its_exposures_where_most_of_the_reference_is_background():
 
 
 @pytest.mark.parametrize("scale", [1e-30, 1e-20, 1e20, 1e30])
+@pytest.mark.slow
 def test_flip_does_not_depend_on_the_unit_of_radiance(scale):
     image, reference = (array.astype(float) for array in make_pictures())
     plain = metrics.compare(image, reference).flip
     assert metrics.compare(image * scale, reference * scale).flip == pytest.approx(plain, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_flip_takes_a_firefly_and_any_range_for_what_they_are():
     _, reference = make_pictures()
     firefly = reference.copy()

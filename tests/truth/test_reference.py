@@ -136,6 +136,7 @@ def test_the_first_bounce_inside_a_sphere_is_constant():
 
 
 @pytest.mark.parametrize("bounces", [1, 2, 4])
+@pytest.mark.slow
 def test_bounces_inside_a_sphere_are_the_geometric_series(bounces):
     scene, rho = make_sphere_scene(0.6), 0.6
     expected = compute_first_bounce(scene) * sum(rho**k for k in range(bounces))
@@ -162,6 +163,7 @@ def test_without_bounces_only_direct_light_is_left():
     [(0.0, 180, False), (0.1, 180, False), (0.1, 120, True)],
     ids=["hemisphere", "clamped", "cone"],
 )
+@pytest.mark.slow
 def test_paths_and_vpls_agree(clamp, fov, smooth):
     """Both estimate one integral: block means of the indirect light agree within their standard errors."""
     scene = room()
@@ -182,6 +184,7 @@ def test_paths_and_vpls_agree(clamp, fov, smooth):
     assert blocks.mean() == pytest.approx(mean, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_stated_error_is_the_error():
     """The spread over seeds and the noise against a far better image are as one image states them."""
     scene = room()

@@ -43,6 +43,7 @@ def test_a_closed_room_gives_back_all_that_the_light_sends(fov):
 
 @pytest.mark.parametrize("pattern", PATTERNS)
 @pytest.mark.parametrize("count", [1, 3, 100])
+@pytest.mark.slow
 def test_every_pattern_and_count_is_unbiased(pattern, count):
     tracer, seeds = Tracer(CLOSED), max(1000 // count, 60)
     sums = [cast(LIGHT, tracer, count, pattern, seed).emission.sum(axis=0) for seed in range(seeds)]
@@ -191,6 +192,7 @@ def test_each_bounce_sends_out_the_albedos_share_of_the_one_before():
         np.testing.assert_allclose(after, before * ALBEDO, rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_few_paths_are_unbiased_over_many_bounces():
     tracer = Tracer(room())
     many = cast(LIGHT, tracer, 16384, "sobol", bounces=5)

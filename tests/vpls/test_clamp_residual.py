@@ -80,6 +80,7 @@ def _get_mesh(scene):
 
 
 @pytest.mark.parametrize("clamp", [0.02, 0.1, 10.0])
+@pytest.mark.slow
 def test_it_is_what_the_clamp_takes(clamp):
     """Also where c is larger than the scene."""
     scene = make_patterned_room()
@@ -89,6 +90,7 @@ def test_it_is_what_the_clamp_takes(clamp):
     np.testing.assert_allclose(found.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), atol=4 * error.max(), rtol=0.01)
 
 
+@pytest.mark.slow
 def test_clamped_vpls_and_the_near_field_are_one_bounce():
     scene, clamp = room(), 0.1
     tracer = Tracer(scene)
@@ -107,6 +109,7 @@ def test_clamped_vpls_and_the_near_field_are_one_bounce():
     np.testing.assert_allclose(*blocks, rtol=0.2, atol=0.1 * truth.indirect.mean())  # and everywhere, not just in all
 
 
+@pytest.mark.slow
 def test_further_bounces_lose_nothing_either():
     scene = make_patterned_room()
     expected, error = trace_lost_light(scene, clamp=0.2, bounces=3)
@@ -116,6 +119,7 @@ def test_further_bounces_lose_nothing_either():
     np.testing.assert_allclose(found.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), atol=4 * error.max(), rtol=0.015)
 
 
+@pytest.mark.slow
 def test_a_disc_light_is_asked_at_its_points():
     scene = room()
     scene = replace(scene, spotlight=replace(scene.spotlight, position=(-0.4, 0.3, 0.3), radius=0.4))
@@ -124,6 +128,7 @@ def test_a_disc_light_is_asked_at_its_points():
     np.testing.assert_allclose(found.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), atol=4 * error.max(), rtol=0.015)
 
 
+@pytest.mark.slow
 def test_light_outside_a_vpls_cone_is_restored_as_far_as_the_rays_reach():
     scene = room()
     expected, error = trace_lost_light(scene, clamp=10.0, fov=120.0)
@@ -178,6 +183,7 @@ def test_a_seed_is_an_image_whatever_the_threads():
 
 
 @pytest.mark.parametrize("samples", [0.25, 0.5, 1.0, 2.0, 3.0, 8.0])
+@pytest.mark.slow
 def test_any_number_of_rays_has_the_same_mean(samples):
     scene = room()
     expected = np.mean([trace_near_light(scene, clamp=0.2, seed=seed).mean() for seed in range(4)])

@@ -57,6 +57,7 @@ def paths(draw):
     budget=st.sampled_from([(0, 0), (0, 3), (4, 8), (64, 64)]),
     seed=st.integers(0, 99),
 )
+@pytest.mark.slow
 def test_what_holds_in_every_frame(lights, scene, count, budget, seed):
     tracer, (least, most) = SCENES[scene], budget
     one, same = IncrementalVpls(count, seed), IncrementalVpls(count, seed)
@@ -111,6 +112,7 @@ def test_the_power_is_that_of_the_light(count):
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.2])
+@pytest.mark.slow
 def test_a_light_that_moves_there_gives_as_much_as_one_that_stands_there(radius):
     """Weights follow the light: after a long path the sum is that of a light that never moved."""
     way = [replace(LIGHT, position=(0.1 + 0.005 * i, 0.2, -0.1), radius=radius) for i in range(60)]

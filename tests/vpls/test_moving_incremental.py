@@ -38,6 +38,7 @@ def corners(box_of: np.ndarray) -> np.ndarray:
     budget=st.sampled_from([(0, 0), (0, 1), (4, 8), (2, 3), (48, 48)]),
     seed=st.integers(0, 99),
 )
+@pytest.mark.slow
 def test_what_holds_in_every_frame(steps, budget, seed):
     """Each step moves one model, or none."""
     least, most = budget
@@ -87,6 +88,7 @@ def test_what_holds_in_every_frame(steps, budget, seed):
 
 
 @pytest.mark.parametrize("most", [1, 2, 8, 24])
+@pytest.mark.slow
 def test_stale_maps_are_drawn_again_and_then_it_rests(most):
     # A block in a corner that the light does not see, but the walls do.
     light = replace(LIGHT, look_at=(-0.4, 0.5, 0.2), fov=30.0)
@@ -174,6 +176,7 @@ def test_a_ray_that_missed_finds_a_model_that_comes():
     assert len(state.update(light, tracer, least=0, most=16)) == 16
 
 
+@pytest.mark.slow
 def test_vpls_go_with_their_model_and_shine_from_where_their_maps_are():
     """With more VPLs than the budget, each is redrawn in its turn, none lags far, and in the end none lags."""
     light = replace(LIGHT, position=(0.0, 0.9, 0.0), look_at=(0.0, -1.0, 0.0))

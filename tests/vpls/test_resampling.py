@@ -59,6 +59,7 @@ def read_vpls(one):
 # The choice
 
 
+@pytest.mark.slow
 def test_a_choice_is_right_on_average_in_every_pixel():
     vpls = cast_candidates()
     tracer = Tracer(ROOMS)
@@ -71,6 +72,7 @@ def test_a_choice_is_right_on_average_in_every_pixel():
 
 
 @pytest.mark.parametrize("bounces", [1, 3])
+@pytest.mark.slow
 def test_images_are_right_on_average(bounces):
     truth = render_indirect(ROOMS, cast_candidates(count=8192, seed=99, bounces=bounces)).mean()
     means = [render_indirect(ROOMS, choose(ROOMS, 32, seed, bounces)).mean() for seed in range(48)]
@@ -91,6 +93,7 @@ def test_none_becomes_brighter_than_its_even_share_allows(effect, count, seed):
         assert gain.min() > 0
 
 
+@pytest.mark.slow
 def test_power_is_the_same_on_average():
     vpls, rng = make_random_vpls(500), np.random.default_rng(4)
     for effect in (rng.random(500) ** 8, np.eye(500)[7], np.zeros(500)):
@@ -195,6 +198,7 @@ def test_probes_pass_over_the_background():
 # What it is for
 
 
+@pytest.mark.slow
 def test_the_error_falls_where_little_of_the_light_reaches_what_is_seen():
     truth = render_indirect(ROOMS, cast_candidates(count=4096, seed=99))
     everywhere = np.ones(truth.shape[:2], bool)
@@ -205,6 +209,7 @@ def test_the_error_falls_where_little_of_the_light_reaches_what_is_seen():
     assert np.mean(better) < np.mean(plain) / 3
 
 
+@pytest.mark.slow
 def test_it_does_no_harm_where_all_of_the_light_is_seen():
     scene = room()
     truth = render_indirect(scene, cast_candidates(scene, 4096, 99))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from deferred_ir.frame.direct_lights import LightVersions, describe_output, pack_lights
+from deferred_ir.frame.direct_lights import LightVersions, describe_output, find_view_owners, pack_lights
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import AXES, LIGHTS_DROPPED, find_reaching, find_shining
 from deferred_ir.frame.pass_io import Io
@@ -37,9 +37,8 @@ class Lights(Pass):
         versions = io.state.update(records, frame.scene)
         if frame.by_view and find_shining(records).any():
             seen = find_reaching(_list_cones(frame.scene), frame.buffers.clusters, frame.scene.camera, frame.size)
-            views = [len(light.list_views()) for light in frame.scene.lights]
-            light_of_view = np.repeat(np.arange(len(records)), views)
-            reaches = (np.bincount(light_of_view, seen, len(records)) > 0) | (np.array(views) == 0)
+            owners, numbers = find_view_owners(frame.scene), np.arange(len(records))
+            reaches = np.isin(numbers, owners[seen]) | ~np.isin(numbers, owners)  # without views nothing is known
             records["emission"][~reaches] = 0
             io.count(LIGHTS_DROPPED.name, int((~reaches).sum()))
         io["lights"].write(records, versions)

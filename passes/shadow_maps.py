@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from deferred_ir.frame.cluster_buffers import ClusterBuffers
-from deferred_ir.frame.direct_lights import CAPACITY
+from deferred_ir.frame.direct_lights import find_view_owners
 from deferred_ir.frame.facts import EMITS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
@@ -25,7 +25,7 @@ from deferred_ir.shadows import figures, mesh_choice
 from deferred_ir.shadows.atlas_cache import AtlasCache
 from deferred_ir.shadows.paraboloid import MapBatch, draw_curved
 from deferred_ir.shadows.settings import MapParams
-from deferred_ir.shadows.views import describe_output, pack_views
+from deferred_ir.shadows.views import CAPACITY, describe_output, pack_views
 
 
 class ShadowMaps(Pass):
@@ -89,7 +89,7 @@ class ShadowMaps(Pass):
         """Clear and draw the maps that the atlas does not hold already."""
         views, vpls = pack_views(frame, self.params, self._edge()), io["vpls"].records
         io["views"].write(views)
-        maps = AtlasCache.begin(io, self.params, all_tiles=frame.keep_all)
+        maps = AtlasCache.begin(io, self.params, find_view_owners(frame.scene), all_tiles=frame.keep_all)
         self.params.prepare(io.gpu)
         io["views"].bind()
         for curved in (False, True):

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from deferred_ir.frame.cluster_buffers import ClusterBuffers
-from deferred_ir.frame.direct_lights import CAPACITY
+from deferred_ir.frame.direct_lights import find_view_owners
 from deferred_ir.frame.facts import EMITS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import find_shining
@@ -23,7 +23,7 @@ from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.shadows import figures, mesh_choice
 from deferred_ir.shadows.paraboloid import MapBatch, draw_curved
 from deferred_ir.shadows.settings import MapParams
-from deferred_ir.shadows.views import describe_output, pack_views
+from deferred_ir.shadows.views import CAPACITY, describe_output, pack_views
 
 
 class SingleMaps(Pass):
@@ -63,7 +63,8 @@ class SingleMaps(Pass):
     def execute(self, frame: Frame, io: Io) -> None:
         """Draw all triangles for each map."""
         self.params.prepare(io.gpu)
-        views, shining = pack_views(frame, self.params, self.params.spot_size), find_shining(io["lights"].records)
+        views = pack_views(frame, self.params, self.params.spot_size)
+        shining = find_shining(io["lights"].records)[find_view_owners(frame.scene)]
         io["views"].write(views)
         io["views"].bind()
         scene = frame.buffers.cluster_buffers

@@ -35,13 +35,17 @@ def describe_output() -> Output:
 
 def pack_lights(scene: Scene) -> np.ndarray:
     """Return LIGHT records (n,) of the scene's lights."""
-    records, view = np.zeros(len(scene.lights), LIGHT), 0
+    records, owners = np.zeros(len(scene.lights), LIGHT), find_view_owners(scene)
+    records["view"] = np.searchsorted(owners, np.arange(len(records)))
     for record, light in zip(records, scene.lights, strict=True):
-        record["view"] = view
         for name, value in light.describe().items():
             record[name] = value
-        view += len(light.list_views())
     return records
+
+
+def find_view_owners(scene: Scene) -> Ints:
+    """Return for each view of the scene's lights the number of its light, ascending, int (views,)."""
+    return np.repeat(np.arange(len(scene.lights)), [len(light.list_views()) for light in scene.lights])
 
 
 class LightVersions:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Bools, Ints
-from deferred_ir.frame.direct_lights import CAPACITY
 from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.shadows.settings import MapParams
+from deferred_ir.shadows.views import CAPACITY
 
 
 @dataclass(frozen=True)
@@ -43,19 +43,20 @@ class AtlasCache:
         self.frame: FrameMaps | None = None
 
     @staticmethod
-    def begin(io: Io, params: MapParams, *, all_tiles: bool) -> FrameMaps:
+    def begin(io: Io, params: MapParams, owners: Ints, *, all_tiles: bool) -> FrameMaps:
         """Clear the places whose maps this frame must draw, or the whole atlas, and return the frame's maps.
 
+        owners: int (views,), the number of the direct light that each view belongs to.
         all_tiles: give the atlas room for every light that there may ever be. Otherwise it has room for the lights of
         the frame, unless their maps can be used again.
         """
         atlas, lights, vpls = io["atlas"], io["lights"], io["vpls"]
         tiles = vpls.records["tile"].astype(int)
-        places = np.concatenate([np.arange(len(lights.records)), CAPACITY + tiles])
+        places = np.concatenate([np.arange(len(owners)), CAPACITY + tiles])
         shining = find_shining(vpls.records)
-        lit = np.concatenate([find_shining(lights.records), shining])
+        lit = np.concatenate([find_shining(lights.records)[owners], shining])
         reusable = lights.versions is not None and vpls.versions is not None
-        versions = np.concatenate([lights.versions, vpls.versions]) if reusable else None
+        versions = np.concatenate([lights.versions[owners], vpls.versions]) if reusable else None
         per_layer = (atlas.size[0] // params.vpl_size) ** 2
         layers = atlas.description.layers
         if versions is None and not all_tiles:

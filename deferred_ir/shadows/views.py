@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from deferred_ir.frame.direct_lights import CAPACITY
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.vpl_buffer import fill_view
 from deferred_ir.graph.ports import Buffer, Output
@@ -27,6 +26,8 @@ VIEW = np.dtype(
 """One view in a std140 uniform block; shaders/lib/shadows/view.glsl declares the same five vec4."""
 
 BINDING = 3
+CAPACITY = 1
+"""Views that the lights of a scene can have; each has a layer of the atlas, or a texture, to itself."""
 WIDEST_PLANAR = 140.0
 """A light wider than this, in degrees, gets a paraboloid map: the planar one has few texels for its middle."""
 LIFT = np.float32(100.0)

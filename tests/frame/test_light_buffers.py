@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from small_scenes import box, build, room
 
-from deferred_ir.frame.direct_lights import LIGHT, LightVersions, pack_lights
+from deferred_ir.frame.direct_lights import LIGHT, LightVersions, find_view_owners, pack_lights
 from deferred_ir.frame.vpl_buffer import VPL, MapVersions, VplParams, fill_view, pack_vpls
 from deferred_ir.sampling.warps import build_basis
+from deferred_ir.scene.lights.base import LightView
+from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.shadows.views import VIEW
 from deferred_ir.vpls.cast import NONE, Vpls
 
@@ -48,6 +51,23 @@ def test_the_record_of_the_spotlight_holds_what_shaders_read():
     assert records["radius"] == 0.25
     assert records["view"] == 0
     np.testing.assert_allclose(records["one_minus_cos"], 1 - math.cos(math.radians(light.fov / 2)), rtol=1e-6)
+
+
+@dataclass(frozen=True)
+class Lamp(Spotlight):
+    """A spotlight with any number of views."""
+
+    views: int = 1
+
+    def list_views(self) -> tuple[LightView, ...]:
+        return super().list_views() * self.views
+
+
+def test_lights_have_any_number_of_views():
+    lights = [Lamp((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), views=views) for views in (2, 0, 1)]
+    scene = SimpleNamespace(lights=lights)
+    np.testing.assert_array_equal(find_view_owners(scene), [0, 0, 2])
+    assert [pack_lights(scene)["view"][i] for i in (0, 2)] == [0, 2]
 
 
 def test_records_of_vpls_hold_what_shaders_read():

@@ -76,7 +76,7 @@ class Accumulation:
         if plan.outputs.get("display", self._source)[0] in self._early - {self._source[0]}:
             raise GraphError(
                 f"{plan.origin}: outputs.display: is not made of outputs.radiance, so it cannot show the mean of "
-                "frames; ask for .npy or .exr only, or for one frame"
+                "frames; ask for files of linear radiance only, such as .npy, or for one frame"
             )
         self._renderer, self._scene, self._seed, self._time = renderer, scene, seed, time
         self._measurement, self._parts = measurement, Measurement() if measurement else None

@@ -97,8 +97,8 @@ def fault(path: Path, image: Image = IMAGE) -> str:
     ("name", "message"),
     [
         ("image.jpg", "unknown kind of image '.jpg'"),
-        ("image.pmg", "did you mean '.png'?"),
-        ("image", "unknown kind of image ''; known: .exr, .npy, .png"),
+        ("image.pnj", "did you mean '.png'?"),
+        ("image", f"unknown kind of image ''; known: {', '.join(list_suffixes())}"),
         ("image.png.bak", "unknown kind of image '.bak'"),
         ("none/image.png", "create it first"),
         ("folder.png", "is a folder; name a file in it"),

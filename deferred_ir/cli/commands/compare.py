@@ -22,7 +22,7 @@ ORDER = 30
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of `deferred-ir compare`."""
-    parser.add_argument("image", metavar="A", help="linear image: .npy or .exr")
+    parser.add_argument("image", metavar="A", help="image of linear radiance, such as .npy or .exr")
     parser.add_argument(
         "reference", metavar="B", help="the reference, likewise; B.json beside it says what it shows, if it is there"
     )

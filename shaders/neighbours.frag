@@ -24,6 +24,7 @@ struct Centre {
     float depth;
     vec3 ray, across, up;  // the pixel's ray, and how rays change from pixel to pixel
     vec3 normal, shading_normal;
+    vec2 code;  // of the shading normal
 };
 
 Centre read_centre(ivec2 pixel, ivec2 size) {
@@ -31,25 +32,35 @@ Centre read_centre(ivec2 pixel, ivec2 size) {
     c.pixel = pixel;
     c.size = size;
     c.depth = texelFetch(depth, pixel, 0).r;
-    decode_normals(texelFetch(normals, pixel, 0), c.shading_normal, c.normal);
+    vec4 code = texelFetch(normals, pixel, 0);
+    decode_normals(code, c.shading_normal, c.normal);
+    c.code = code.xy;
     c.across = frame.ray[0].xyz * (2.0 / float(size.x));
     c.up = frame.ray[1].xyz * (2.0 / float(size.y));
     c.ray = frame.ray[0].xyz * ndc.x + frame.ray[1].xyz * ndc.y + frame.ray[2].xyz;
     return c;
 }
 
-// Whether the pixel `other` lies in the frame and on the same surface.
-bool counts(Centre c, ivec2 other) {
+// Whether the pixel `other` lies in the frame and shows a surface in the plane of the centre's.
+bool in_plane(Centre c, ivec2 other) {
     float d = texelFetch(depth, other, 0).r;
     vec2 away = vec2(other - c.pixel);
     // From the centre's point to the other's, times both depths / near: no division, and 0 for the centre itself.
     vec3 off = (c.ray + c.across * away.x + c.up * away.y) * c.depth - c.ray * d;
     float height = dot(c.normal, off);
-    vec3 n = octahedron(round_normal(texelFetch(normals, other, 0).xy));
-    float likeness = dot(c.shading_normal, n);
     bool inside = all(lessThan(uvec2(other), uvec2(c.size)));
-    return inside && d > 0.0 && likeness >= 0.0 && likeness * likeness >= cosine_squared * dot(n, n)
-        && height * height <= sine_squared * dot(off, off);
+    return inside && d > 0.0 && height * height <= sine_squared * dot(off, off);
+}
+
+vec2 read_code(ivec2 pixel) {
+    return texelFetch(normals, pixel, 0).xy;
+}
+
+// Whether a shading normal with this code is like the centre's.
+bool alike(Centre c, vec2 code) {
+    vec3 n = octahedron(round_normal(code));
+    float likeness = dot(c.shading_normal, n);
+    return likeness >= 0.0 && likeness * likeness >= cosine_squared * dot(n, n);
 }
 
 // Sets of up to 64 numbers, in words of 32 bits.
@@ -79,8 +90,21 @@ void main() {
         write_window(pixel, found, x, y, false);
         return;
     }
-    for (int tap = 0; tap < TAPS; ++tap)
-        if (counts(c, tap_pixel(corner, tap))) found |= only(tap);
+    uvec2 bent = uvec2(0u);  // taps in the plane with a normal of their own
+    for (int tap = 0; tap < TAPS; ++tap) {
+        ivec2 other = tap_pixel(corner, tap);
+        if (in_plane(c, other)) {
+            if (read_code(other) == c.code) found |= only(tap);
+            else bent |= only(tap);
+        }
+    }
+    if (!alike(c, c.code)) found = uvec2(0u);
+    // Few normals are to be compared where surfaces are flat. The loop takes as many turns as the pixel with most has.
+    for (int word = 0; word < WORDS; ++word)
+        for (uint taps = bent[word]; taps != 0u; taps &= taps - 1u) {
+            int tap = word * 32 + findLSB(taps);
+            if (alike(c, read_code(tap_pixel(corner, tap)))) found |= only(tap);
+        }
     int number = bitCount(found.x) + bitCount(found.y);
     bool lonely = float(number) <= fewest && number < TAPS;
     uvec2 absent = uvec2(0u);  // shares
@@ -92,7 +116,8 @@ void main() {
             absent |= only(place.y * N + place.x);
             bool there = false;
             for (int i = 0; i < tries && !there; ++i) {  // in x, in y, in both
-                there = counts(c, other + away * ivec2(i != 1, i != 0));
+                ivec2 across = other + away * ivec2(i != 1, i != 0);
+                there = in_plane(c, across) && alike(c, read_code(across));
                 if (there && i != 1) x |= only(tap);
                 if (there && i != 0) y |= only(tap);
             }

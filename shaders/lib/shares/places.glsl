@@ -7,7 +7,8 @@ ivec2 part_start(ivec2 share, ivec2 size) {
 }
 
 ivec2 split_place(ivec2 pixel, ivec2 size) {
-    return part_start(pixel % INTERLEAVE, size) + pixel / INTERLEAVE;
+    uvec2 place = uvec2(pixel);  // unsigned: dividing by a power of two is a shift
+    return part_start(ivec2(place % uint(INTERLEAVE)), size) + ivec2(place / uint(INTERLEAVE));
 }
 
 ivec2 whole_place(ivec2 place, ivec2 share, ivec2 size) {

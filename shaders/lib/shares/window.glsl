@@ -11,7 +11,8 @@ ivec2 window_corner(ivec2 pixel, ivec2 size) {
 }
 
 ivec2 tap_pixel(ivec2 corner, int tap) {
-    return corner + ivec2(tap % N, tap / N);
+    uint number = uint(tap);  // unsigned: dividing by a power of two is a shift
+    return corner + ivec2(number % uint(N), number / uint(N));
 }
 
 // The steps in x and in y to the pixels of the same share on the other side of `pixel`.

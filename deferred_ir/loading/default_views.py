@@ -15,7 +15,7 @@ from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.base.errors import DeviceError
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.recentre import recentre, translate_view
+from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def choose_views(scene: Scene, camera: bool, spotlight: bool) -> Scene:
     near, reasons = _choose_by_rays(recentre(scene.at(0)), camera, spotlight)
     by = scene.geometry.centre
     views: dict[str, Any] = {"camera": near.camera, "spotlight": near.spotlight}
-    views = {name: translate_view(views[name], by) if any(by) else views[name] for name in reasons}
+    views = {name: views[name].translate(by) if any(by) else views[name] for name in reasons}
     return replace(scene, **views, chosen={name: _describe(views[name], why) for name, why in reasons.items()})
 
 

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from pyglm import glm
 
-from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.base.arrays import Array, Vec3, add_vec3
 from deferred_ir.scene.motion import CameraMotion
 
 
@@ -77,3 +77,8 @@ class Camera:
             return self
         position, look_at = self.motion.move(self.position, self.look_at, time)
         return replace(self, position=position, look_at=look_at)
+
+    def translate(self, by: Vec3) -> Camera:
+        """Return the camera moved by a vector, at rest there."""
+        position, look_at = add_vec3(self.position, by), add_vec3(self.look_at, by)
+        return replace(self, position=position, look_at=look_at, motion=None)

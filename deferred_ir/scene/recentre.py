@@ -6,17 +6,11 @@ The GPU and Embree get every scene this way. Both steps are done in 64 bits.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TypeVar
 from weakref import WeakKeyDictionary
 
-from deferred_ir.base.arrays import Vec3
-from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.geometry import Geometry
 from deferred_ir.scene.large_triangles import split_large_triangles
-from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.scene import Scene
-
-View = TypeVar("View", Camera, Spotlight)
 
 _recentred: WeakKeyDictionary[Geometry, Geometry | None] = WeakKeyDictionary()
 """Results by what they were made from, None where that needs no change: the dictionary must not keep its own keys."""
@@ -35,8 +29,8 @@ def recentre(scene: Scene) -> Scene:
     return replace(
         scene,
         geometry=geometry,
-        camera=translate_view(scene.camera, by),
-        spotlight=translate_view(scene.spotlight, by),
+        camera=scene.camera.translate(by),
+        spotlight=scene.spotlight.translate(by),
     )
 
 
@@ -71,9 +65,3 @@ def _recentre_pose(geometry: Geometry) -> Geometry:
         poses = poses.copy()
         poses[:, :3, 3] += poses[:, :3, :3] @ geometry.centre - geometry.centre
     return rest.pose(poses)
-
-
-def translate_view(view: View, by: Vec3) -> View:
-    """Return a camera or spotlight moved by a vector, at rest there."""
-    (x, y, z), (u, v, w), (a, b, c) = view.position, view.look_at, by
-    return replace(view, position=(x + a, y + b, z + c), look_at=(u + a, v + b, w + c), motion=None)

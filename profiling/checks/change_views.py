@@ -10,7 +10,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.recentre import recentre, translate_view
+from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
 
 
@@ -60,9 +60,7 @@ def scale(scene: Scene, factor: float) -> Scene:
 def shift(scene: Scene, by: Vec3) -> Scene:
     """Translate the whole scene."""
     geometry = replace(scene.geometry, positions=scene.geometry.positions + by)
-    return replace(
-        scene, geometry=geometry, camera=translate_view(scene.camera, by), spotlight=translate_view(scene.spotlight, by)
-    )
+    return replace(scene, geometry=geometry, camera=scene.camera.translate(by), spotlight=scene.spotlight.translate(by))
 
 
 def brighten(scene: Scene, factor: float) -> Scene:

@@ -12,7 +12,6 @@ import numpy as np
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.motion import ModelMotion
-from deferred_ir.scene.recentre import translate_view
 from deferred_ir.scene.scene import Geometry, Material, Model, Scene, Texture
 
 GREY = (0.5, 0.5, 0.5)
@@ -157,9 +156,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
 def move_away(scene: Scene, by: tuple[float, float, float] = FAR) -> Scene:
     """`scene` somewhere else: vertices, camera and light moved by the same vector."""
     geometry = replace(scene.geometry, positions=scene.geometry.positions + by)
-    return replace(
-        scene, geometry=geometry, camera=translate_view(scene.camera, by), spotlight=translate_view(scene.spotlight, by)
-    )
+    return replace(scene, geometry=geometry, camera=scene.camera.translate(by), spotlight=scene.spotlight.translate(by))
 
 
 def gable() -> Scene:

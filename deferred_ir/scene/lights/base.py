@@ -51,3 +51,9 @@ class Light(Protocol):
 
     def list_views(self) -> tuple[LightView, ...]:
         """Return what its shadow maps must cover, a map each; none where its shadows need no map."""
+
+    def at(self, time: float) -> Light:
+        """Return the light where it is at `time` seconds of its motion."""
+
+    def translate(self, by: Vec3) -> Light:
+        """Return the light moved by a vector, at rest there."""

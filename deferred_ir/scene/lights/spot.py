@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.base.arrays import Array, Vec3, add_vec3
 from deferred_ir.sampling.warps import build_basis, lift_to_hemisphere
 from deferred_ir.scene.lights.base import LightView
 from deferred_ir.scene.motion import SpotlightMotion
@@ -87,6 +87,11 @@ class Spotlight:
             return self
         position, look_at = self.motion.move(self.position, self.look_at, time)
         return replace(self, position=position, look_at=look_at)
+
+    def translate(self, by: Vec3) -> Spotlight:
+        """Return the spotlight moved by a vector, at rest there."""
+        position, look_at = add_vec3(self.position, by), add_vec3(self.look_at, by)
+        return replace(self, position=position, look_at=look_at, motion=None)
 
 
 def one_minus_cos(fov: float) -> float:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from pages import ROOT, between
+from pages import ROOT, replace_between
 
 from deferred_ir.profiling.limits import bench
 
@@ -19,9 +19,9 @@ SCENES = ("cornell", "atrium", "colors")
 
 def main() -> None:
     """Measure, print and write."""
-    found = bench.report(SCENES)
-    print(found)
-    PAGE.write_text(between(PAGE.read_text(encoding="utf-8"), BEGIN, END, found), encoding="utf-8")
+    table = bench.report(SCENES)
+    print(table)
+    PAGE.write_text(replace_between(PAGE.read_text(encoding="utf-8"), BEGIN, END, table), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Takes a screenshot of a small report: `python tools/look.py`, or `make look`; the picture is out/report.png.
 
-A browser opens the page without network, as whoever gets the file would see it.
+A browser opens the page without network, as a reader of the file would.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ FOLDER = ROOT / "out" / "look"
 PICTURE = ROOT / "out" / "report.png"
 WIDTH, HEIGHT = 1100, 4000
 TALLEST = 16000
-"""Browsers draw no taller windows."""
+"""Tallest window that browsers draw, pixels."""
 MARGIN = 32
 FLAGS = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
 )
 LONGEST = 120
-"""Seconds that a browser may take."""
+"""Longest run of a browser, seconds."""
 
 
-def screenshot(page: Path, picture: Path) -> None:
-    """The whole of `page`, which must end in white, as a PNG file."""
+def save_screenshot(page: Path, picture: Path) -> None:
+    """Save a screenshot of the whole page, which must end in white, as PNG."""
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         raise SystemExit(f"no browser: install one of {', '.join(BROWSERS)}")
@@ -71,13 +71,13 @@ def screenshot(page: Path, picture: Path) -> None:
 
 
 def main() -> int:
-    """Sweep, open the page, say where the picture is."""
+    """Run the sweep, open its page, save and name the screenshot."""
     shutil.rmtree(FOLDER, ignore_errors=True)  # points of another version of the program do not count
     swept = subprocess.run([sys.executable, "-m", "deferred_ir", *SWEEP, "-o", FOLDER], cwd=ROOT, check=False)
     if swept.returncode:
         return swept.returncode
     PICTURE.unlink(missing_ok=True)
-    screenshot(FOLDER / "report.html", PICTURE)
+    save_screenshot(FOLDER / "report.html", PICTURE)
     print(PICTURE)
     return 0
 

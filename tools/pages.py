@@ -97,8 +97,8 @@ def paths(page: Path) -> set[str]:
     return {span for span in re.findall(r"`([^`\n]+)`", _outside_blocks(page)) if re.fullmatch(r"(\w+/)+[\w.-]*", span)}
 
 
-def between(page: str, begin: str, end: str, text: str) -> str:
-    """The text of a page with `text` between two markers, in the place of what stands there."""
+def replace_between(page: str, begin: str, end: str, text: str) -> str:
+    """Return a page with the text between two markers replaced."""
     before, found, rest = page.partition(begin)
     _, closed, after = rest.partition(end)
     if not found or not closed:

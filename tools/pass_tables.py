@@ -1,7 +1,7 @@
 """Writes the tables of passes into docs/graph.md: `python tools/pass_tables.py`.
 
-Ports and parameters are stated once, in the passes; the page repeats them between two markers. A test checks that it
-is up to date. What a pass writes may depend on its inputs: shown are built-in graphs at their defaults.
+Ports and parameters are stated once, in the passes; the page repeats them between two markers. A test checks
+that it is up to date. What a pass writes may depend on its inputs; the tables show built-in graphs at their defaults.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from pages import ROOT, between
+from pages import ROOT, replace_between
 
 from deferred_ir.frame.facts import TRIANGLES
 from deferred_ir.graph import file
@@ -30,25 +30,25 @@ END = "<!-- end of passes -->"
 
 
 def steps() -> dict[str, Step]:
-    """For each type of pass, a step of a built-in graph that uses it."""
-    found = {}
+    """Return for each type of pass a step of a built-in graph that uses it."""
+    result = {}
     large = Facts({TRIANGLES: 100_000})  # a scene in which no pass is left out
     for name in sorted(file.graph_names(), key=lambda name: name != "deferred"):
         graph = file.load_graph(name)
         for step in compile(graph, list(graph.outputs), large).steps:
             kind = type(step.work).__module__.rpartition(".")[2]
-            found.setdefault(kind, step)
-    return found
+            result.setdefault(kind, step)
+    return result
 
 
 def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
-    """A Markdown table and an empty line."""
+    """Return the lines of a Markdown table, and an empty one."""
     lines = [head, ("---",) * len(head), *rows]
     return [*("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines), ""]
 
 
 def section(kind: str, work: Pass, outputs: Mapping[str, Output]) -> list[str]:
-    """Heading, ports and parameters of one type of pass."""
+    """Return the lines on one type of pass: heading, ports and parameters."""
     summary = (type(work).__doc__ or "").strip().splitlines()[0]
     ports = []
     for port, declared in work.inputs.items():
@@ -64,7 +64,7 @@ def section(kind: str, work: Pass, outputs: Mapping[str, Output]) -> list[str]:
 
 
 def tables() -> str:
-    """The whole section between the markers. What a pass writes that is in no built-in graph is not shown."""
+    """Return the text between the markers. Outputs are left out for passes that no built-in graph has."""
     found, lines = steps(), list[str]()
     for kind in file.pass_types():
         step = found.get(kind)
@@ -73,10 +73,10 @@ def tables() -> str:
     return "\n".join(lines)
 
 
-def updated(page: str) -> str:
-    """The page with its tables as they should be."""
-    return between(page, BEGIN, END, tables())
+def update(page: str) -> str:
+    """Return the page with up-to-date tables."""
+    return replace_between(page, BEGIN, END, tables())
 
 
 if __name__ == "__main__":
-    PAGE.write_text(updated(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(update(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

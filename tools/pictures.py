@@ -29,7 +29,7 @@ VIEWER_PICTURE = "viewer.png"
 
 
 def write_example(folder: Path) -> str:
-    """Put the files of the worked example into `folder`; the script to run comes last on the page."""
+    """Write the files of the worked example to `folder`. Returns the script to run, which comes last on the page."""
     files = [block for block in blocks(EXAMPLE) if block.file]
     for block in files:
         (folder / block.file).write_text(block.text, encoding="utf-8")
@@ -37,7 +37,7 @@ def write_example(folder: Path) -> str:
 
 
 def run_example(target: Path) -> None:
-    """Run the worked example as its reader would, and keep its picture."""
+    """Run the worked example as a reader would, and copy its picture."""
     with tempfile.TemporaryDirectory() as name:
         script = write_example(Path(name))
         subprocess.run([sys.executable, script], cwd=name, check=True)
@@ -45,17 +45,17 @@ def run_example(target: Path) -> None:
 
 
 def main(wanted: list[str]) -> int:
-    """Make all pictures, or those that are named."""
-    made = SCENES | picture_commands()
-    known = [*made, EXAMPLE_PICTURE, VIEWER_PICTURE]
+    """Make the named pictures, or all."""
+    rendered = SCENES | picture_commands()
+    known = [*rendered, EXAMPLE_PICTURE, VIEWER_PICTURE]
     if unknown := set(wanted) - set(known):
         print(f"no such picture: {', '.join(sorted(unknown))}; known: {', '.join(sorted(known))}", file=sys.stderr)
         return 2
     (ROOT / PICTURES).mkdir(exist_ok=True)
     for name in wanted or known:
-        if name in made:
-            print(" ".join(made[name]), flush=True)
-            subprocess.run([sys.executable, "-m", "deferred_ir", *made[name][1:]], cwd=ROOT, check=True)
+        if name in rendered:
+            print(" ".join(rendered[name]), flush=True)
+            subprocess.run([sys.executable, "-m", "deferred_ir", *rendered[name][1:]], cwd=ROOT, check=True)
         elif name == VIEWER_PICTURE:
             print(f"the viewer: {name}", flush=True)
             viewer_picture.main(str(ROOT / PICTURES / name))

@@ -1,9 +1,9 @@
 """Proves that a refactoring changes no pixel: `python tools/pixels.py [SCENE ...]`, or `make pixels`.
 
-Renders the built-in scenes, and any scene files that are named, with every graph: several seeds, bounces, soft shadows,
-wide lights, moving lights and models, reused frames, and the parameters that choose other code. The first run keeps
-hashes and pixels in out/pixels; later runs are held against them, and exit with 1 if one differs, with how much.
-`--keep` keeps anew. Pictures depend on the driver, so what is kept is never committed.
+Renders the built-in scenes, and the scene files named, with every graph: several seeds, bounces, soft shadows, wide
+lights, moving lights and models, reuse between frames, and the parameters that select other code. The first run saves
+pixels and their hashes in out/pixels. Later runs compare with them, report how far images differ, and exit with 1 if
+any does. `--keep` replaces what was saved. Images depend on the driver, so they are never committed.
 
 It uses the public interface only, so the environment of an older checkout can run it as well.
 """
@@ -85,12 +85,12 @@ WRITTEN = {
     "light moves": ROOM.format(model=BLOCK, camera="", light="fov = 90" + LISSAJOUS),
     "all move": ROOM.format(model=MOVING, camera=CAMERA, light="fov = 90\nradius = 0.03" + LISSAJOUS),
 }
-"""Scenes that the tool writes itself, by name."""
+"""Scene files that the tool writes itself, by name."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One picture or several: `times` and `seeds` go through the same Renderer, one after the other."""
+    """Images of one Renderer: one for each of `times` and `seeds`, in that order."""
 
     scene: str
     graph: str
@@ -104,7 +104,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """What tells it from the others."""
+        """A name that no other case has."""
         changed = [f"{key}={value}" for key, value in self.set.items()]
         if self.vpls != VPLS:
             changed.append(f"vpls={self.vpls}")
@@ -115,10 +115,10 @@ class Case:
 
 
 def cases(extra: list[str]) -> Iterator[Case]:
-    """All that are rendered; `extra` are scene files."""
+    """List all cases. extra: scene files."""
     for scene in (*SCENES, *extra):
         for graph in GRAPHS:
-            yield Case(scene, graph, times=(0.0,) * (3 if graph == "incremental" else 1))  # which fills up by and by
+            yield Case(scene, graph, times=(0.0,) * (3 if graph == "incremental" else 1))  # VPLs fill up over frames
     times = (0.0, 0.03, 0.06, 0.5, 0.5, 1.0)
     for graph in GRAPHS:
         yield Case("cornell", graph, seeds=(1, 7))
@@ -157,25 +157,25 @@ def cases(extra: list[str]) -> Iterator[Case]:
     yield Case("colors", "deferred", {"tonemap.exposure": 1.5})
 
 
-def pictures(case: Case, folder: Path) -> dict[str, np.ndarray]:
-    """What a case draws, "name of the picture" -> pixels."""
+def render(case: Case, folder: Path) -> dict[str, np.ndarray]:
+    """Render a case. Returns pixels by the names of the images. folder: of the scene files written."""
     import deferred_ir as ir
 
     path = folder / f"{case.scene}.toml"
     scene = ir.load(str(path) if path.exists() else case.scene)
     options = {"set": case.set, "reuse": case.reuse, "keep_all": case.keep_all, "device": "software"}
-    made = {}
+    images = {}
     with ir.Renderer(SIZE, case.graph, **options) as renderer:
         for i, time in enumerate(case.times):
             for j, seed in enumerate(case.seeds):
                 image = renderer.render(scene, vpls=case.vpls, seed=seed, time=time, accumulate=case.accumulate)
-                made[f"{case.name} [{i} {time:g} s, {j} seed {seed}] radiance"] = image.radiance
-                made[f"{case.name} [{i} {time:g} s, {j} seed {seed}] display"] = image.display
-    return made
+                images[f"{case.name} [{i} {time:g} s, {j} seed {seed}] radiance"] = image.radiance
+                images[f"{case.name} [{i} {time:g} s, {j} seed {seed}] display"] = image.display
+    return images
 
 
-def references(folder: Path) -> Iterator[tuple[str, np.ndarray]]:
-    """What the path tracer and the sum over VPLs with shadow rays give."""
+def trace_references(folder: Path) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield name and pixels of images of the path tracer, and of the sum over VPLs with shadow rays."""
     for scene in ("cornell", "soft", "all move"):
         for options in ("--spp 4", "--spp 4 --bounces 2 --seed 3", "--vpls 32", "--vpls 16 --set vpl.clamp=0.1"):
             path, out = folder / f"{scene}.toml", folder / "reference.npy"
@@ -185,8 +185,8 @@ def references(folder: Path) -> Iterator[tuple[str, np.ndarray]]:
             yield f"reference {scene} {options}", np.load(out)
 
 
-def difference(image: np.ndarray, before: np.ndarray) -> str:
-    """How far two pictures are apart, in words."""
+def describe_difference(image: np.ndarray, before: np.ndarray) -> str:
+    """Describe how far two images differ."""
     if image.shape != before.shape:
         return f"{image.shape} instead of {before.shape}"
     a, b = image.astype(float), before.astype(float)
@@ -194,52 +194,90 @@ def difference(image: np.ndarray, before: np.ndarray) -> str:
     return f"{int((image != before).any(axis=-1).sum())} pixels, relMSE {error:.3g}"
 
 
-def main() -> int:
-    """Exit status 0 if all pictures are as they were kept, or none were."""
-    parser = argparse.ArgumentParser(description="Renders many pictures and holds them against those kept before.")
-    parser.add_argument("scenes", nargs="*", help="scene files to render besides the built-in scenes")
-    parser.add_argument("--keep", action="store_true", help="keep these pictures, whatever was kept before")
-    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "pixels", help="where they are kept")
-    parser.add_argument("--only", default="", help="cases whose name has this in it")
-    options = parser.parse_args()
-    kept, folder = options.folder / "hashes.json", options.folder
-    folder.mkdir(parents=True, exist_ok=True)
-    before = {} if options.keep or not kept.exists() else json.loads(kept.read_text())
-    found: dict[str, str] = {}
-    differ = []
+def write_scenes(folder: Path) -> None:
+    """Write the scene files of WRITTEN and their model."""
+    (folder / "box.obj").write_text(BOX + FACES)
+    for name, scene in WRITTEN.items():
+        (folder / f"{name}.toml").write_text(scene)
 
-    def take(name: str, pixels: np.ndarray) -> None:
-        found[name] = hashlib.sha256(repr((pixels.dtype, pixels.shape)).encode() + pixels.tobytes()).hexdigest()[:32]
-        file = folder / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.npy"
-        if not before:
-            np.save(file, pixels)
-        elif name in before and before[name] != found[name]:
-            differ.append(f"{name}: {difference(pixels, np.load(file))}")
-            tqdm.write(differ[-1])
 
-    with tempfile.TemporaryDirectory() as text, warnings.catch_warnings():
+def draw_all(scenes: list[str], only: str) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield name and pixels of each image. only: of the cases with this in their names, without references."""
+    with tempfile.TemporaryDirectory() as name, warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        written = Path(text)
-        (written / "box.obj").write_text(BOX + FACES)
-        for name, scene in WRITTEN.items():
-            (written / f"{name}.toml").write_text(scene)
-        chosen = [case for case in cases(options.scenes) if options.only in case.name]
-        for case in tqdm(chosen, desc="pixels", unit="case"):
-            for name, pixels in pictures(case, written).items():
-                take(name, pixels)
-        for name, pixels in () if options.only else references(written):
-            take(name, pixels)
-    missing = [] if options.only else sorted(before.keys() - found.keys())
-    if not before:
-        kept.write_text(json.dumps(found, indent=0))
-        print(f"{len(found)} pictures kept in {folder}; change the code and run this again")
-        return 0
+        folder = Path(name)
+        write_scenes(folder)
+        for case in tqdm([case for case in cases(scenes) if only in case.name], desc="pixels", unit="case"):
+            yield from render(case, folder).items()
+        if not only:
+            yield from trace_references(folder)
+
+
+class Store:
+    """Saved images: their hashes in one file, and the pixels of each in another."""
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        self._folder, self._file = folder, folder / "hashes.json"
+        self.hashes: dict[str, str] = json.loads(self._file.read_text()) if self._file.exists() else {}
+
+    @staticmethod
+    def hash(pixels: np.ndarray) -> str:
+        """Return 32 hex digits for the pixels, their type and their shape."""
+        return hashlib.sha256(repr((pixels.dtype, pixels.shape)).encode() + pixels.tobytes()).hexdigest()[:32]
+
+    def _path(self, name: str) -> Path:
+        return self._folder / f"{hashlib.sha256(name.encode()).hexdigest()[:16]}.npy"
+
+    def load(self, name: str) -> np.ndarray:
+        """Load the pixels of a saved image."""
+        pixels: np.ndarray = np.load(self._path(name))
+        return pixels
+
+    def save(self, images: Iterator[tuple[str, np.ndarray]]) -> int:
+        """Replace all that is saved. Returns the number of images."""
+        self.hashes = {}
+        for name, pixels in images:
+            self.hashes[name] = self.hash(pixels)
+            np.save(self._path(name), pixels)
+        self._file.write_text(json.dumps(self.hashes, indent=0))
+        return len(self.hashes)
+
+
+def compare(images: Iterator[tuple[str, np.ndarray]], store: Store, *, complete: bool) -> bool:
+    """Compare images with saved ones and print the differences. Returns whether all are the same.
+
+    complete: the images are all there are, so a saved one that is missing is a difference.
+    """
+    names, same, new = set[str](), 0, 0
+    for name, pixels in images:
+        names.add(name)
+        if name not in store.hashes:
+            new += 1
+        elif store.hashes[name] == store.hash(pixels):
+            same += 1
+        else:
+            tqdm.write(f"{name}: {describe_difference(pixels, store.load(name))}")
+    missing = sorted(store.hashes.keys() - names) if complete else []
     for name in missing:
         print(f"not drawn any more: {name}")
-    same = sum(before.get(name) == digest for name, digest in found.items())
-    new = len(found.keys() - before.keys())
-    print(f"{same} of {len(found)} pictures are the same" + (f", {new} are new" if new else ""))
-    return 1 if differ or missing else 0
+    print(f"{same} of {len(names)} pictures are the same" + (f", {new} are new" if new else ""))
+    return same + new == len(names) and not missing
+
+
+def main() -> int:
+    """Save images, or compare with saved ones. Exit status 0 if there were none, or all are the same."""
+    parser = argparse.ArgumentParser(description="Render many images and compare them with images saved before.")
+    parser.add_argument("scenes", nargs="*", help="scene files to render besides the built-in scenes")
+    parser.add_argument("--keep", action="store_true", help="replace the saved images")
+    parser.add_argument("--folder", type=Path, default=ROOT / "out" / "pixels", help="where the images are saved")
+    parser.add_argument("--only", default="", help="only cases with this in their names")
+    options = parser.parse_args()
+    store, images = Store(options.folder), draw_all(options.scenes, options.only)
+    if options.keep or not store.hashes:
+        print(f"{store.save(images)} pictures saved in {options.folder}; change the code and run this again")
+        return 0
+    return 0 if compare(images, store, complete=not options.only) else 1
 
 
 if __name__ == "__main__":

@@ -21,18 +21,18 @@ FOLDERS: dict[str, str] = PROJECT["tool"]["setuptools"]["package-dir"]
 
 
 def modules() -> dict[str, Path]:
-    """All modules of the package by the name they have once installed, with their files in the checkout."""
-    found = {}
+    """Return the file in the checkout of each module, by the name it has once installed."""
+    files = {}
     for package, folder in FOLDERS.items():
         for file in (ROOT / folder).rglob("*.py"):
             inner = file.relative_to(ROOT / folder).with_suffix("").parts
             parts = [package, *(inner[:-1] if inner[-1] == "__init__" else inner)]
-            found[".".join(parts)] = file
-    return found
+            files[".".join(parts)] = file
+    return files
 
 
 def install(target: Path) -> None:
-    """Installs the package into `target`, built from a copy: a build leaves stale modules behind in its tree."""
+    """Install the package into `target`, built from a copy, since a build leaves stale modules in its tree."""
     with tempfile.TemporaryDirectory() as name:
         copy = Path(name)
         for folder in FOLDERS.values():
@@ -44,8 +44,8 @@ def install(target: Path) -> None:
         subprocess.run([*pip, "--no-deps", "--no-build-isolation", "--target", target, copy], check=True)
 
 
-def in_checkout(text: str, known: dict[str, Path]) -> str:
-    """mypy's messages with the paths of the installed files replaced by those in the checkout."""
+def map_to_checkout(text: str, known: dict[str, Path]) -> str:
+    """Replace the paths of installed files in mypy's messages by those in the checkout."""
 
     def path(match: re.Match[str]) -> str:
         module = match[1].removesuffix("/__init__").replace("/", ".")
@@ -56,7 +56,7 @@ def in_checkout(text: str, known: dict[str, Path]) -> str:
 
 
 def main() -> int:
-    """Exit status 0 if every file was checked and none has a fault."""
+    """Check all files. Exit status 0 if every file was checked and none has a fault."""
     known = modules()
     with tempfile.TemporaryDirectory() as name:
         installed = Path(name)
@@ -69,7 +69,7 @@ def main() -> int:
         mypy = [sys.executable, "-m", "mypy", "-p", "deferred_ir"]
         options = [f"--config-file={ROOT / 'pyproject.toml'}", f"--cache-dir={ROOT / '.mypy_cache'}"]
         done = subprocess.run([*mypy, *options], cwd=installed, capture_output=True, text=True, check=False)
-    sys.stdout.write(in_checkout(done.stdout, known))
+    sys.stdout.write(map_to_checkout(done.stdout, known))
     sys.stderr.write(done.stderr)
     count = re.search(r"(?:checked|in) (\d+) source files", done.stdout)
     if not count or int(count[1]) < len(known):  # mypy counts folders of shaders as well
@@ -79,7 +79,7 @@ def main() -> int:
 
 
 def installed_file(folder: Path, module: str) -> Path:
-    """Where `module` lies once installed into `folder`."""
+    """Return the file of `module` once installed into `folder`."""
     path = folder.joinpath(*module.split("."))
     return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
 

@@ -1,15 +1,14 @@
-"""A long run in one process: whether memory and OpenGL's objects stay as they are, and images what they were.
+"""Check in a long run of one process that memory, the number of OpenGL objects and the images do not change.
 
     python -m deferred_ir.profiling.checks.soak --frames 20000 --loads 500
 
-Stretches of frames, each with other settings and a light that moves, come round again and again on one renderer, and
-in between scenes are loaded anew, one in ten on a context of its own. The first tenth counts as warming up. Exit
-status 1 where something grows afterwards or an image differs.
+One renderer draws stretches of frames with a moving light, each stretch with other settings, again and again. In
+between, scenes are loaded anew, one in ten on a context of its own. The first tenth of the run is a warm-up. The exit
+status is 1 if anything grows after it or an image differs.
 """
 
 from __future__ import annotations
 
-import argparse
 import ctypes
 import gc
 import hashlib
@@ -25,16 +24,17 @@ import deferred_ir as ir
 from deferred_ir.base.progress import progress_bar
 from deferred_ir.engine.measurement import Measurement
 from deferred_ir.profiling.figures import markdown
+from deferred_ir.profiling.study import command_line
 from deferred_ir.scene.motion import FRAMES_PER_SECOND, LissajousMotion
 from deferred_ir.scene.scene import Scene
 
 STRETCH = 20
 """Frames with the same settings."""
 FRESH = 10
-"""One in so many loads, the first among them, gets a context of its own."""
+"""The first of this many loads gets a context of its own."""
 SCENES = ("cornell", "colors")
 SLACK = 8
-"""MiB that resident memory may grow by: allocators and drivers take it in larger pieces."""
+"""MiB that resident memory may grow by, since allocators and drivers take it in larger pieces."""
 SETTINGS: tuple[dict[str, Any], ...] = (
     {"graph": "deferred", "size": (48, 32), "set": {"vpl.count": 16}},
     {"graph": "deferred", "size": (48, 32), "set": {"vpl.count": 16, "tonemap.exposure": 1.0}},
@@ -47,12 +47,12 @@ SETTINGS: tuple[dict[str, Any], ...] = (
 )
 
 ROUND = 2 * len(SETTINGS)
-"""Stretches until all has been: all settings, redoing everything and reusing what has not changed."""
+"""Stretches until everything was done once: all settings, with and without reuse of unchanged results."""
 
 
 @dataclass(frozen=True)
 class Count:
-    """What there was after so many frames and loads: objects by kind, and memory in MiB."""
+    """The number of objects by kind and the memory in MiB after a number of frames and loads."""
 
     frames: int
     loads: int
@@ -62,7 +62,7 @@ class Count:
 
 @dataclass
 class Soak:
-    """What has been done and seen. images: the first of each kind, as digests."""
+    """The progress and results of a run. images: digests of the first image of each kind."""
 
     frames: int = 0
     loads: int = 0
@@ -70,13 +70,13 @@ class Soak:
     images: dict[str, str] = field(default_factory=dict)
     different: list[str] = field(default_factory=list)
 
-    def note(self, one: ir.Renderer) -> None:
+    def count(self, one: ir.Renderer) -> None:
         """Count objects and memory."""
         with one.gpu.ctx:
-            self.counts.append(Count(self.frames, self.loads, one.gpu.gl.count_objects(), held()))
+            self.counts.append(Count(self.frames, self.loads, one.gpu.gl.count_objects(), measure_memory()))
 
     def compare(self, kind: str, image: ir.Image) -> None:
-        """Hold an image against the first of its kind."""
+        """Compare an image with the first of its kind."""
         assert image.radiance is not None
         assert image.display is not None
         digest = hashlib.sha256(image.radiance.tobytes() + image.display.tobytes()).hexdigest()
@@ -85,12 +85,12 @@ class Soak:
 
     @property
     def warm(self) -> Count:
-        """After a tenth of the run: programs are compiled by then, and allocators have had their worst moments."""
+        """The count after a tenth of the run, when programs are compiled and allocators are warm."""
         return self.counts[len(self.counts) // 10]
 
     @property
     def faults(self) -> list[str]:
-        """What is not as it was after a tenth of the run."""
+        """What has grown since a tenth of the run, and images that differ."""
         first, last = self.warm, self.counts[-1]
         grown = [
             f"{kind}: {count} became {last.objects[kind]}"
@@ -102,8 +102,8 @@ class Soak:
         return grown + self.different
 
 
-def held() -> float:
-    """MiB resident once all that is free is given back to Linux: else allocators keep as much as there ever was."""
+def measure_memory() -> float:
+    """Return the resident memory in MiB, after returning free memory to Linux, which allocators would hold back."""
     gc.collect()
     ctypes.CDLL(None).malloc_trim(0)
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
@@ -111,10 +111,10 @@ def held() -> float:
 
 
 def soak(frames: int, loads: int, seconds: float) -> Iterator[Soak]:
-    """Runs stretch after stretch; after each what has been done. Ends when all is done, or after `seconds`."""
+    """Draw stretch after stretch, for at most `seconds`. Yields the state after each."""
     done, until = Soak(), clock.monotonic() + seconds
     stretches = -(-frames // STRETCH)
-    scene = moving(ir.load("cornell"))
+    scene = move_light(ir.load("cornell"))
     with ir.Renderer(**SETTINGS[0]) as one:
         for number in range(stretches):
             if clock.monotonic() > until:
@@ -122,25 +122,25 @@ def soak(frames: int, loads: int, seconds: float) -> Iterator[Soak]:
             which = number % len(SETTINGS)
             one.reuse = number % ROUND >= len(SETTINGS)
             one.configure(**SETTINGS[which])
-            done.compare(f"setting {which}", stretch(one, scene, min(STRETCH, frames - done.frames)))
+            done.compare(f"setting {which}", draw_stretch(one, scene, min(STRETCH, frames - done.frames)))
             done.frames += min(STRETCH, frames - done.frames)
             for _ in range(loads * (number + 1) // stretches - done.loads):
                 done.loads += 1
-                load(one, SCENES[done.loads % len(SCENES)], done)
+                load_scene(one, SCENES[done.loads % len(SCENES)], done)
             if number % ROUND == ROUND - 1 or number == stretches - 1:
-                done.note(one)
+                done.count(one)
             yield done
 
 
-def moving(scene: Scene) -> Scene:
-    """The scene with a light that moves."""
+def move_light(scene: Scene) -> Scene:
+    """Let the scene's light move."""
     reach = 0.05 * scene.geometry.diagonal
     motion = LissajousMotion((reach, reach / 4, reach), (3.0, 2.0))
     return replace(scene, spotlight=replace(scene.spotlight, motion=motion))
 
 
-def stretch(one: ir.Renderer, scene: Scene, frames: int) -> ir.Image:
-    """The last of some frames that begin afresh, each timed; the last frame of a shorter stretch is drawn anyway."""
+def draw_stretch(one: ir.Renderer, scene: Scene, frames: int) -> ir.Image:
+    """Draw and time frames after a reset. Returns the last; a shorter stretch ends with the same frame."""
     one.reset()
     plan, measurement = one.plan(scene), Measurement()
     for frame in [*range(frames - 1), STRETCH - 1]:
@@ -149,8 +149,8 @@ def stretch(one: ir.Renderer, scene: Scene, frames: int) -> ir.Image:
     return one.read(plan)
 
 
-def load(one: ir.Renderer, name: str, done: Soak) -> None:
-    """Load a scene and render it: on `one`, or every now and then on a context of its own."""
+def load_scene(one: ir.Renderer, name: str, done: Soak) -> None:
+    """Load a scene and render it, on `one` or, for one load in FRESH, on a context of its own."""
     scene = ir.load(name)
     if done.loads % FRESH != 1:
         one.reset()
@@ -162,7 +162,7 @@ def load(one: ir.Renderer, name: str, done: Soak) -> None:
 
 
 def table(done: Soak) -> str:
-    """Markdown: objects and memory after a tenth of the run, half-way and at the end."""
+    """Return a Markdown table of objects and memory after a tenth of the run, half-way and at the end."""
     chosen = [done.warm, done.counts[len(done.counts) // 2], done.counts[-1]]
     head = ("", "frames", "loads", *chosen[0].objects, "MiB")
     rows = [
@@ -173,11 +173,10 @@ def table(done: Soak) -> str:
 
 
 def main() -> int:
-    """Run, print the table and what has gone wrong; an exit status."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--frames", type=int, default=20000, metavar="N")
-    parser.add_argument("--loads", type=int, default=500, metavar="N", help="of scenes, among the frames")
-    parser.add_argument("--minutes", type=float, default=30.0, metavar="M", help="at most")
+    """Run, and print the table and the faults. Returns an exit status."""
+    parser = command_line(__doc__, scenes=False, frames=20000)
+    parser.add_argument("--loads", type=int, default=500, metavar="N", help="scenes loaded among the frames")
+    parser.add_argument("--minutes", type=float, default=30.0, metavar="N", help="longest run")
     chosen = parser.parse_args()
     done = Soak()
     try:
@@ -187,7 +186,7 @@ def main() -> int:
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
     if len(done.counts) < 2:
-        print(f"{done.frames} frames: fewer than two rounds, which tell nothing", file=sys.stderr)
+        print(f"{done.frames} frames: fewer than two rounds, too few to compare", file=sys.stderr)
         return 1
     print(table(done))
     for fault in done.faults:

@@ -1,4 +1,4 @@
-"""Do shadow maps agree with rays? Pairs of a pixel and a light, asked of both, one row a projection and map size.
+"""Compare shadow maps with rays: for pairs of a pixel and a light, do both see the same? A row a projection and size.
 
 A frame pairs each pixel with one light (visibility_pairs.py), and Embree says whether something lies between the two.
 The next frame has other VPLs, other pairs, and a camera turned by less than a pixel. Pairs of one frame share their
@@ -38,9 +38,9 @@ SOURCES = {
 MAPS = "shadow_maps"
 VPL_SIZE = f"{MAPS}.vpl_size"
 LEAST_FRAMES = 8
-"""Fewer would tell no standard error."""
+"""Fewest frames for a standard error."""
 MOST_FRAMES = 256
-"""Where hardly a pixel faces a light, the pairs asked for would take for ever."""
+"""Most frames: where hardly a pixel faces a light, all the pairs asked for would take too long."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,8 @@ class Options:
 
 
 @dataclass(frozen=True)
-class Share:
-    """A share of all pairs, or of all light, and its standard error; None where there is none."""
+class Fraction:
+    """A fraction of all pairs or of all light, and its standard error; both None without pairs or light."""
 
     value: float | None
     error: float | None
@@ -68,9 +68,9 @@ class Share:
 
 @dataclass(frozen=True)
 class Row:
-    """What was found of the lights of one kind ("spotlight", "vpls") in maps of one projection and size (texels).
+    """The result for one kind of lights ("spotlight", "vpls") and maps of one projection and size (texels).
 
-    mismatch: pairs of which map and ray disagree, the sum of leaks (lit by the map, blocked for the ray) and
+    mismatch: pairs on which map and ray disagree, the sum of leaks (lit by the map, blocked for the ray) and
     false_shadows (the reverse). A map that says half or more counts as lit. light_wrong, light_leaked and light_lost:
     the same with the map's answer as it is, weighted by the irradiance that the pair has without shadow.
     vpls: rays that were cast for them. size: of a frame, (width, height).
@@ -88,21 +88,21 @@ class Row:
     map_size: int
     frames: int
     pairs: int
-    mismatch: Share
-    leaks: Share
-    false_shadows: Share
-    light_wrong: Share
-    light_leaked: Share
-    light_lost: Share
+    mismatch: Fraction
+    leaks: Fraction
+    false_shadows: Fraction
+    light_wrong: Fraction
+    light_leaked: Fraction
+    light_lost: Fraction
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data for JSON."""
         return asdict(self)
 
 
 @dataclass(frozen=True)
 class _Maps:
-    """Maps to measure: whose, and how they are made."""
+    """A kind of maps to measure. lights: whose maps they are."""
 
     lights: str
     projection: str
@@ -110,22 +110,24 @@ class _Maps:
 
 
 def rows(scene: Scene, options: Options, progress: Progress | None = None) -> Iterator[Row]:
-    """Measure `scene`: for each projection a row for the spotlight, and one for the VPLs with each size of map.
+    """Yield a row for the spotlight with each projection, and for the VPLs with each projection and map size.
 
-    None where the spotlight is dark. Raises GraphError before the first row for settings that do not fit any.
+    Yields none if the spotlight emits nothing. Raises GraphError before the first row for settings that do not fit any.
     """
     scene = recentre(scene)  # as the maps and Embree have it
-    for settings, chosen in _planned(scene, options):
+    for settings, chosen in _choose_maps(scene, options):
         with Renderer(options.size, GRAPH, options.device, set=settings, passes=PASSES) as renderer:
             for maps in chosen:
-                yield _row(renderer, scene, options, maps, _frames(renderer, scene, maps.lights, options, progress))
+                yield _row(
+                    renderer, scene, options, maps, _measure_frames(renderer, scene, maps.lights, options, progress)
+                )
 
 
-def _planned(scene: Scene, options: Options) -> list[tuple[dict[str, Any], list[_Maps]]]:
-    """Settings, and which maps to measure with them: each kind once, however many settings make it."""
-    planned, known = list[tuple[dict[str, Any], list[_Maps]]](), set[_Maps]()
+def _choose_maps(scene: Scene, options: Options) -> list[tuple[dict[str, Any], list[_Maps]]]:
+    """Return settings, each with the kinds of maps to measure with them; no kind twice."""
+    chosen, known = list[tuple[dict[str, Any], list[_Maps]]](), set[_Maps]()
     if not scene.emits:
-        return planned
+        return chosen
     wide = scene.spotlight.fov > WIDEST_PLANAR
     for choice in _projections(options.settings):
         for vpl_size in options.vpl_sizes:
@@ -134,32 +136,34 @@ def _planned(scene: Scene, options: Options) -> list[tuple[dict[str, Any], list[
             steps = compile(graph, list(graph.outputs), collect_facts(scene)).steps
             step = next(step for step in steps if step.name == MAPS)
             parts = step.work.subpasses(step.descriptions)  # the spotlight's, then those of VPLs
-            found = [
+            kinds = [
                 _Maps(lights, "paraboloid" if lights == "spotlight" and wide else part["projection"], part["size"])
                 for lights, part in zip(("spotlight", "vpls"), parts, strict=False)
             ]
-            planned.append((settings, [maps for maps in found if maps not in known]))
-            known |= set(found)
-    return [(settings, maps) for settings, maps in planned if maps]
+            chosen.append((settings, [maps for maps in kinds if maps not in known]))
+            known |= set(kinds)
+    return [(settings, maps) for settings, maps in chosen if maps]
 
 
 def _projections(settings: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The settings for each projection that maps can have; only for that which `settings` ask for, if any."""
+    """Return the settings of each projection, or only of the one that `settings` name."""
     name = f"{MAPS}.projection"
     choices = [settings[name]] if name in settings else specs(MapParams)["projection"].choices
     return [{name: choice} for choice in choices]
 
 
-def _frames(renderer: Renderer, scene: Scene, lights: str, options: Options, progress: Progress | None) -> Array:
-    """Sums over the pairs of each frame, (frames, 6), as in `Pairs.sums`."""
+def _measure_frames(
+    renderer: Renderer, scene: Scene, lights: str, options: Options, progress: Progress | None
+) -> Array:
+    """Draw frames until there are enough pairs. Returns the sums of each, (frames, 6), as in `Pairs.sums`."""
     plan = renderer.plan(scene, outputs=[lights])
     rng = np.random.default_rng(options.seed)
     sums: list[Array] = []
     done = 0
     while len(sums) < LEAST_FRAMES or (done < options.pairs and len(sums) < MOST_FRAMES):
-        moved = replace(scene, camera=_turned(scene.at(0).camera, options.size, rng.random(2) - 0.5))
+        moved = replace(scene, camera=_turn(scene.at(0).camera, options.size, rng.random(2) - 0.5))
         renderer.draw(moved, plan, seed=options.seed * MOST_FRAMES + len(sums))
-        sums.append(judged(renderer, moved, lights).sums())
+        sums.append(trace_pairs(renderer, moved, lights).sums())
         done += int(sums[-1][0])
         if progress:
             progress(done, max(options.pairs, done))
@@ -168,8 +172,8 @@ def _frames(renderer: Renderer, scene: Scene, lights: str, options: Options, pro
     return np.array(sums)
 
 
-def _turned(camera: Camera, size: tuple[int, int], pixels: Array) -> Camera:
-    """The camera turned to the right and up by `pixels` (2,) of an image of `size`."""
+def _turn(camera: Camera, size: tuple[int, int], pixels: Array) -> Camera:
+    """Turn the camera to the right and up by `pixels` (2,) of an image of `size`."""
     right, up, forward = camera.ray_axes(size)
     away = np.linalg.norm(np.subtract(camera.look_at, camera.position))
     aim = np.asarray(camera.position) + away * (
@@ -180,10 +184,11 @@ def _turned(camera: Camera, size: tuple[int, int], pixels: Array) -> Camera:
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """n pairs of a frame that face each other, the pixel within the light's cone; arrays are float64.
+    """n pairs of a frame that face each other, with the pixel in the light's cone. Arrays are float64.
 
-    light: its number in its buffer, int (n,). position, normal: the pixel's surface, (n, 3). shown: what the map says,
-    (n,) from 0 to 1. lit: what the ray says, bool (n,). irradiance: without shadow, its luminance, (n,).
+    light: its number in its buffer, int (n,). position, normal: the pixel's surface, (n, 3). shown: visibility by the
+    map, (n,) from 0 to 1. lit: visibility by the ray, bool (n,). irradiance: luminance of the unshadowed irradiance,
+    (n,).
     """
 
     light: Ints
@@ -194,25 +199,25 @@ class Pairs:
     irradiance: Array
 
     def sums(self) -> Array:
-        """Number of pairs, leaks and false shadows, then light in all, leaked and lost, (6,)."""
+        """Return the number of pairs, leaks and false shadows, then all light, leaked and lost light, (6,)."""
         shown, lit = self.shown >= 0.5, self.lit
         leaked, lost = (self.irradiance @ np.maximum(off, 0) for off in (self.shown - lit, lit - self.shown))
         return np.array([len(lit), (shown & ~lit).sum(), (~shown & lit).sum(), self.irradiance.sum(), leaked, lost])
 
 
-def judged(renderer: Renderer, scene: Scene, lights: str) -> Pairs:
-    """The pairs of the frame of `scene` drawn last with `lights` ("spotlight", "vpls"), and what rays say of them."""
+def trace_pairs(renderer: Renderer, scene: Scene, lights: str) -> Pairs:
+    """Read the pairs of the last frame, of `scene` and `lights` ("spotlight", "vpls"), and trace a ray for each."""
     source, records_of = SOURCES[lights]
     with renderer.gpu.ctx:
         pairs, facing = (renderer.executor.resource((source, port)).read()[::-1] for port in ("pairs", "facing"))
         records = renderer.executor.resource(records_of).records
-    counts = pairs[..., 2] > 0  # what faces away, or lies outside the cone, gets nothing
+    counts = pairs[..., 2] > 0  # pixels that face away or lie outside the cone get no light
     number, shown, irradiance, depth = pairs[counts].astype(np.float64).T
     away = np.float32(NEAR * scene.geometry.scale) / depth
     position = np.asarray(scene.camera.position) + scene.camera.rays(renderer.size)[counts] * away[:, None]
     normal, light = facing[counts, :3].astype(np.float64), number.astype(int)
     target, tracer = records["position"][light].astype(np.float64), renderer.tracer()
-    if lights == "vpls":  # which lie on surfaces; the spotlight hangs free
+    if lights == "vpls":  # they lie on surfaces, unlike the spotlight
         target = tracer.lift(target, records["z_axis"][light].astype(np.float64))
     lit = ~tracer.occluded(tracer.lift(position, normal), target)
     return Pairs(light, position, normal, shown, lit, irradiance)
@@ -234,44 +239,46 @@ def _row(renderer: Renderer, scene: Scene, options: Options, maps: _Maps, sums: 
         map_size=maps.size,
         frames=len(sums),
         pairs=int(pairs.sum()),
-        mismatch=_share(leaks + false_shadows, pairs),
-        leaks=_share(leaks, pairs),
-        false_shadows=_share(false_shadows, pairs),
-        light_wrong=_share(leaked + lost, light),
-        light_leaked=_share(leaked, light),
-        light_lost=_share(lost, light),
+        mismatch=_divide(leaks + false_shadows, pairs),
+        leaks=_divide(leaks, pairs),
+        false_shadows=_divide(false_shadows, pairs),
+        light_wrong=_divide(leaked + lost, light),
+        light_leaked=_divide(leaked, light),
+        light_lost=_divide(lost, light),
     )
 
 
-def _share(parts: Array, wholes: Array) -> Share:
-    """sum(parts) / sum(wholes) and its standard error by the spread of the frames, those of a ratio estimator."""
+def _divide(parts: Array, wholes: Array) -> Fraction:
+    """Return sum(parts) / sum(wholes) and the standard error of this ratio estimator, by the spread of the frames."""
     whole, count = wholes.sum(), len(wholes)
     if whole == 0:
-        return Share(None, None)
-    share = parts.sum() / whole
-    off = parts - share * wholes
-    return Share(float(share), float(np.sqrt(count / (count - 1) * (off**2).sum()) / whole))
+        return Fraction(None, None)
+    ratio = parts.sum() / whole
+    off = parts - ratio * wholes
+    return Fraction(float(ratio), float(np.sqrt(count / (count - 1) * (off**2).sum()) / whole))
 
 
-SHARES = {"mismatch": 17, "leaks": 8, "false_shadows": 15, "light_wrong": 17, "light_leaked": 14, "light_lost": 12}
-"""Fields of a row in the table, in per cent, and the widths of their columns."""
+FRACTIONS = {"mismatch": 17, "leaks": 8, "false_shadows": 15, "light_wrong": 17, "light_leaked": 14, "light_lost": 12}
+"""Fields of a row that the table shows in per cent, and the widths of their columns."""
 WITH_ERROR = ("mismatch", "light_wrong")
 
 
 def heading(width: int) -> str:
-    """The table's first line; `width` is that of the longest scene's name."""
-    shares = [f"{name.replace('_', ' '):>{wide}}" for name, wide in SHARES.items()]
-    return f"{'scene':<{width}}  lights     projection    map      pairs{''.join(shares)}"
+    """Return the table's first line. width: of the longest scene's name."""
+    fractions = [f"{name.replace('_', ' '):>{wide}}" for name, wide in FRACTIONS.items()]
+    return f"{'scene':<{width}}  lights     projection    map      pairs{''.join(fractions)}"
 
 
 def line(row: Row, width: int) -> str:
-    """A row as a line of the table."""
-    shares = [f"{_percent(getattr(row, name), error=name in WITH_ERROR):>{wide}}" for name, wide in SHARES.items()]
+    """Return a line of the table."""
+    fractions = [
+        f"{_percent(getattr(row, name), error=name in WITH_ERROR):>{wide}}" for name, wide in FRACTIONS.items()
+    ]
     what = f"{row.scene:<{width}}  {row.lights:<9}  {row.projection:<11}"
-    return f"{what} {row.map_size:>5}  {row.pairs:>9,}{''.join(shares)}"
+    return f"{what} {row.map_size:>5}  {row.pairs:>9,}{''.join(fractions)}"
 
 
-def _percent(share: Share, *, error: bool) -> str:
-    if share.value is None or share.error is None:
+def _percent(fraction: Fraction, *, error: bool) -> str:
+    if fraction.value is None or fraction.error is None:
         return "-"
-    return f"{100 * share.value:.3f}" + (f" +-{100 * share.error:.3f}" if error else "")
+    return f"{100 * fraction.value:.3f}" + (f" +-{100 * fraction.error:.3f}" if error else "")

@@ -1,6 +1,6 @@
-"""A pass that asks the shadow maps about one light a pixel: lights, vpls, G-buffer, atlas -> pairs.
+"""A pass that looks up one light a pixel in the shadow maps: lights, vpls, G-buffer, atlas -> pairs.
 
-It reads the maps through the same GLSL as `lighting`, so what it tells is what a picture shows.
+It reads the maps through the same GLSL as `lighting`, so its answers are those of an image.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Params(ShadowFilter):
 
 
 class VisibilityPairs(Pass):
-    """Pairs each pixel with the spotlight, or with a VPL that a hash of pixel and seed draws."""
+    """Pairs each pixel with the spotlight, or with a VPL chosen by a hash of pixel and seed."""
 
     Params = Params
     shader_folder = FOLDER
@@ -43,7 +43,7 @@ class VisibilityPairs(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Both in 32 bits: a ray has to find the pixel's surface again."""
+        """Declare both outputs with 32 bits: a ray has to find the pixel's surface again."""
         del inputs
         pairs = "number of light or VPL, visibility, unshadowed luminance, reversed depth; 0 without a light"
         return {
@@ -52,13 +52,13 @@ class VisibilityPairs(Pass):
         }
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """One fullscreen draw a block of VPLs; each pixel is drawn by the block that has its light."""
+        """Draw one fullscreen triangle a block of VPLs; a pixel is drawn by the block with its light."""
         vpls, direct = io["vpls"], self.params.lights_of == "spotlight"
         io.framebuffer.clear_color(0)
         io.framebuffer.clear_color(1)
         total = len(vpls.records)
         if not direct and total == 0:
-            return  # no VPL lives
+            return  # there is no VPL
         io["lights"].bind()
         io["views"].bind()
         program = io.program("visibility.frag", defines={"DISC": 0, **self.params.defines()})

@@ -1,4 +1,4 @@
-"""What is not the GPU's: Python's own time in a frame, and a cold start against the least that one can be."""
+"""Costs beside the GPU: Python's own time in a frame, and a cold start against the least possible one."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ CALLS = {
     moderngl.Context: ("finish", "enable", "disable", "enable_direct", "disable_direct", "__enter__", "__exit__"),
     Tracer: ("_map",),
 }
-"""Methods that do the work of others: drivers, which draw in the caller's thread if there is no GPU, and Embree."""
+"""Methods whose time is not Python's: of drivers, which draw in the caller's thread without a GPU, and of Embree."""
 CONTEXT = "import numpy, moderngl; moderngl.create_standalone_context({}).clear()"
-"""The least that a program with arrays and OpenGL does."""
+"""The least that a program with arrays and OpenGL has to do."""
 
 
 @contextmanager
 def stopwatch() -> Iterator[list[float]]:
-    """Add the thread's time inside long calls of OpenGL and Embree to the one number of the list."""
+    """Yield a list of one number: the thread's seconds inside calls of OpenGL and Embree that can take long."""
     spent = [0.0]
 
     def timed(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -54,16 +54,16 @@ def stopwatch() -> Iterator[list[float]]:
 
 
 def python_time(scene: str, *, vpls: int, size: tuple[int, int], turns: int, device: str) -> list[float]:
-    """Python's own time in each of `turns` deferred frames, milliseconds.
+    """Return Python's own time in each of `turns` deferred frames, milliseconds.
 
-    CPU time of the thread less that inside OpenGL and Embree; of OpenGL only the calls that can take long are taken
-    off, so it is an upper bound. Waiting does not count: a busy machine would add it in any place.
+    It is the thread's CPU time without that inside OpenGL and Embree. Only OpenGL calls that can take long are
+    subtracted, so it is an upper bound. Waiting does not count, since a busy machine adds it anywhere.
     """
     loaded, times = load(scene), []
     with stopwatch() as spent, Renderer(size, "deferred", device) as renderer:
         plan = renderer.plan(loaded, vpls, ["radiance"])
         renderer.draw(loaded, plan)
-        for _ in range(turns):  # of one seed, as in an animation: its pattern is made once
+        for _ in range(turns):  # with one seed, as in an animation, whose pattern is made once
             start, others = time.thread_time(), spent[0]
             renderer.draw(loaded, plan)
             times.append((time.thread_time() - start - (spent[0] - others)) * 1e3)
@@ -71,9 +71,9 @@ def python_time(scene: str, *, vpls: int, size: tuple[int, int], turns: int, dev
 
 
 def cold_start(scene: str, *, vpls: int, size: tuple[int, int], turns: int, device: str) -> list[float]:
-    """How often importing NumPy and moderngl and opening a context fits into rendering `scene` once, in each turn.
+    """Return for each turn how many times as long rendering `scene` once takes as the program CONTEXT.
 
-    Both in fresh processes, in turns, after one that does not count: files and compiled shaders are in the caches.
+    Both run in new processes, in turns, after a first turn that fills the caches of files and shaders.
     """
     with tempfile.TemporaryDirectory() as folder:
         width, height = size
@@ -86,7 +86,7 @@ def cold_start(scene: str, *, vpls: int, size: tuple[int, int], turns: int, devi
 
 
 def seconds(command: Sequence[str]) -> float:
-    """Wall time of a process; what it prints is not shown unless it fails."""
+    """Return the wall time of a process in seconds. Raises SystemExit with its output if it fails."""
     start = time.perf_counter()
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:

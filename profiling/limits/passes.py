@@ -1,4 +1,4 @@
-"""Passes that do the least that a pass of the graph `deferred` must do: profiling/limits/bench.py compares."""
+"""Passes that do the least work a pass of the graph `deferred` needs; bench.py compares both."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class LimitLighting(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """The target that lighting has."""
+        """Declare the same target as lighting."""
         del inputs
         return {"radiance": Output("lights that reach the pixel; 0 on the background", Texture("rgba32f"))}
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """One fullscreen draw a block of VPLs."""
+        """Draw one fullscreen triangle a block of VPLs."""
         del frame
         ctx, vpls = io.gpu.ctx, io["vpls"]
         io["lights"].bind()
@@ -52,14 +52,14 @@ class LimitLighting(Pass):
 
 
 class LimitMaps(ShadowMaps):
-    """The same triangles from the same lights into one plain depth buffer of as many texels as the atlas.
+    """Draws the same triangles from the same lights into one depth buffer with as many texels as the atlas.
 
     One draw a light into a viewport of its own, where the hardware clips: no layers, tiles or clip distances in the
     shaders. Layers of the atlas lie above one another, so that every texel comes out the same.
     """
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """The atlas with its layers laid out."""
+        """Declare the atlas with its layers above one another."""
         outputs = super().outputs(inputs)
         atlas = outputs["atlas"]
         assert isinstance(atlas.description, Texture)
@@ -95,4 +95,4 @@ class LimitMaps(ShadowMaps):
 
 
 LIMITS: Mapping[str, type[Pass]] = {"limit_lighting": LimitLighting, "limit_maps": LimitMaps}
-"""By the name of their type; a graph file beside this one, of the same name, puts each in its place."""
+"""Pass types by name; for each, a graph file of the same name beside this file uses it."""

@@ -29,7 +29,7 @@ LARGEST_SEED = 2**31 - 1
 
 
 def available() -> str | None:
-    """None if Cycles can be used here, else the reason why not."""
+    """Return None if Cycles can be used here, else the reason why not."""
     if importlib.util.find_spec("bpy") is None:
         return "bpy is not installed (its wheels are for one Python version each)"
     return None
@@ -37,9 +37,6 @@ def available() -> str | None:
 
 class Peer:
     """Cycles with `scene` at time 0 loaded, for images of `size` (width, height)."""
-
-    own_light = False
-    """Whether the light is another than that of docs/conventions.md, so that only an own image can judge it."""
 
     about: str
 
@@ -50,17 +47,17 @@ class Peer:
             import bpy
 
             self._bpy: Any = bpy
-            bpy.ops.wm.read_factory_settings(use_empty=True)
+            bpy.ops.wm.read_factory_set_up(use_empty=True)
             cycles_scene.build(bpy, scene.at(0.0))
-            _settings(bpy.context.scene, size, bounces)
+            _set_up(bpy.context.scene, size, bounces)
         self.about = f"Cycles of Blender {bpy.app.version_string}, CPU"
         self.render(1, 0)  # builds its BVH and the denoiser's network
 
     def render(self, spp: int, seed: int, *, denoise: bool = True) -> Rendered:
-        """An image of `spp` paths a pixel, denoised or not.
+        """Render with `spp` paths a pixel, and denoise on request.
 
-        `ms` holds all of Blender's render operator: bringing its scene to Cycles (what did not change stays there),
-        tracing, denoising and handing over the image; not the file through which the image leaves Blender.
+        `ms` is the time of Blender's render operator: updating Cycles' scene, tracing, denoising and returning the
+        image. The file through which the image leaves Blender is not part of it.
         """
         view = self._bpy.context.scene
         view.cycles.samples, view.cycles.seed = spp, seed % LARGEST_SEED
@@ -73,15 +70,15 @@ class Peer:
         return Rendered(radiance, ms)
 
     def _pixels(self) -> Array:
-        """Blender gives no access to the pixels of a render result but by a file."""
+        """Read the pixels of the render result, which Blender gives only as a file."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "image.exr"
             self._bpy.data.images["Render Result"].save_render(str(path))
             return read_radiance(path).astype(np.float32)
 
 
-def _settings(view: Any, size: tuple[int, int], bounces: int) -> None:
-    """Direct light and `bounces` diffuse bounces, a box filter over the pixel, nothing clamped or cut short."""
+def _set_up(view: Any, size: tuple[int, int], bounces: int) -> None:
+    """Set direct light and `bounces` diffuse bounces, a box filter over the pixel, and no clamping or early ends."""
     render, cycles = view.render, view.cycles
     render.engine = "CYCLES"
     render.resolution_x, render.resolution_y = size
@@ -107,7 +104,7 @@ def _settings(view: Any, size: tuple[int, int], bounces: int) -> None:
     cycles.use_auto_tile = False
     cycles.use_light_tree = False  # there is one light
     cycles.pixel_filter_type = "BOX"
-    # Of patterns, prefilters and qualities these had the least error x time on cornell at 256x256 and 4 spp.
+    # This pattern, prefilter and quality had the least error x time on cornell at 256x256 and 4 spp.
     cycles.sampling_pattern = "BLUE_NOISE"
     cycles.denoiser = "OPENIMAGEDENOISE"
     cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
@@ -118,14 +115,14 @@ def _settings(view: Any, size: tuple[int, int], bounces: int) -> None:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Keep off the standard output what Blender prints, such as a warning that there is no CUDA."""
+    """Silence what Blender prints on standard output, such as a warning that there is no CUDA."""
     sys.stdout.flush()
-    kept = os.dup(1)
+    stdout = os.dup(1)
     null = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(null, 1)
         yield
     finally:
-        os.dup2(kept, 1)
+        os.dup2(stdout, 1)
         os.close(null)
-        os.close(kept)
+        os.close(stdout)

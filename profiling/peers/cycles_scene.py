@@ -1,4 +1,4 @@
-"""A scene of ours as Blender's: one mesh, its materials, the camera, and the spotlight by nodes."""
+"""Conversion of a scene to Blender's: one mesh, its materials, the camera, and the spotlight as nodes."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
 from deferred_ir.scene.scene import Material, Scene, Texture
 
 POINT_POWER = 4 * np.pi
-"""Power, in watts, at which a point light of Blender's shines with 1 W/sr per unit of its nodes' emission."""
+"""Power in watts at which Blender's point light has 1 W/sr for each unit of its nodes' emission."""
 DISC_POWER = np.pi
-"""The same for a disc along its axis."""
+"""Power in watts at which Blender's disc light has the same along its axis."""
 FARTHEST = 10.0
 """Far plane, in distances from the camera to the farthest corner of the scene."""
 
 
 def build(bpy: Any, scene: Scene) -> None:
-    """Fill Blender's empty scene; its axes are ours, since nothing here depends on which way is up."""
+    """Fill Blender's empty scene. Its axes are used as ours, since nothing depends on which way is up."""
     link = bpy.context.scene.collection.objects.link
     images = [_image(bpy, texture) for texture in scene.textures]
     mesh = _mesh(bpy, scene.geometry)
@@ -41,7 +41,7 @@ def build(bpy: Any, scene: Scene) -> None:
 
 
 def _mesh(bpy: Any, geometry: Geometry) -> Any:
-    """Every corner has a vertex of its own: Cycles takes the file's normals from vertices, not from corners."""
+    """Build a mesh with a vertex for each corner: Cycles takes a file's normals from vertices, not from corners."""
     mesh = bpy.data.meshes.new("scene")
     corners = geometry.faces.ravel()
     mesh.vertices.add(len(corners))
@@ -66,7 +66,7 @@ def _mesh(bpy: Any, geometry: Geometry) -> Any:
 
 
 def _corner_normals(geometry: Geometry, normals: Array) -> Array:
-    """The shading normals (3F, 3) of all corners of faces, turned into the hemisphere of the face's normal."""
+    """Return the shading normals of the faces' corners (3F, 3), turned into the hemisphere of the face's normal."""
     flat = np.repeat(geometry.face_normals, 3, axis=0)
     own = normals[geometry.faces.ravel()].astype(np.float64)
     side = np.where((own * flat).sum(axis=1) < 0, -1.0, 1.0)
@@ -79,7 +79,7 @@ def _attribute(mesh: Any, name: str, kind: str, domain: str, values: Array) -> N
 
 
 def _image(bpy: Any, texture: Texture) -> Any:
-    """In linear floats, because Cycles would decode an sRGB image after filtering, and we decode before."""
+    """Build an image of linear floats: Cycles would decode sRGB after filtering, and we decode before."""
     height, width, _ = texture.pixels.shape
     image = bpy.data.images.new(texture.name, width, height, alpha=False, float_buffer=True, is_data=True)
     pixels = np.ones((height, width, 4), np.float32)
@@ -89,10 +89,10 @@ def _image(bpy: Any, texture: Texture) -> Any:
 
 
 def _material(bpy: Any, material: Material, image: Any, colored: bool) -> Any:
-    """Diffuse, of reflectance = albedo * texture * vertex colour."""
-    made = bpy.data.materials.new(material.name)
-    made.use_nodes = True
-    nodes = _Nodes(made.node_tree)
+    """Build a diffuse material with reflectance = albedo * texture * vertex colour."""
+    result = bpy.data.materials.new(material.name)
+    result.use_nodes = True
+    nodes = _Nodes(result.node_tree)
     diffuse = nodes.add("ShaderNodeBsdfDiffuse", Roughness=0.0)
     reflectance = nodes.value(material.albedo)
     if image is not None:
@@ -107,11 +107,11 @@ def _material(bpy: Any, material: Material, image: Any, colored: bool) -> Any:
         reflectance = nodes.vector("MULTIPLY", reflectance, color.outputs["Color"])
     nodes.join(reflectance, diffuse.inputs["Color"])
     nodes.join(diffuse.outputs["BSDF"], nodes.add("ShaderNodeOutputMaterial").inputs["Surface"])
-    return made
+    return result
 
 
 def _light(bpy: Any, spotlight: Spotlight) -> Any:
-    """A point light, or a disc that shines with cos(theta) by itself; the nodes give the cone, and a point's cosine."""
+    """Build a point light or a disc. The nodes give the cone and a point's cosine; a disc has the cosine by itself."""
     point = spotlight.radius == 0
     light = bpy.data.lights.new("spotlight", "POINT" if point else "AREA")
     if point:
@@ -132,11 +132,11 @@ def _light(bpy: Any, spotlight: Spotlight) -> Any:
     emission = nodes.add("ShaderNodeEmission", Strength=shine)
     emission.inputs["Color"].default_value = (*spotlight.emission, 1)
     nodes.join(emission.outputs["Emission"], nodes.add("ShaderNodeOutputLight").inputs["Surface"])
-    made = bpy.data.objects.new("spotlight", light)
+    body = bpy.data.objects.new("spotlight", light)
     right, up = build_basis(spotlight.axis)
-    made.matrix_world = _matrix(-right, up, -spotlight.axis, spotlight.position)
-    made.visible_camera = False
-    return made
+    body.matrix_world = _matrix(-right, up, -spotlight.axis, spotlight.position)
+    body.visible_camera = False
+    return body
 
 
 def _camera(bpy: Any, camera: Camera, geometry: Geometry) -> Any:
@@ -148,45 +148,45 @@ def _camera(bpy: Any, camera: Camera, geometry: Geometry) -> Any:
     farthest = np.abs(geometry.bounds - camera.position).max(axis=0)
     lens.clip_start = 1e-4 * geometry.diagonal
     lens.clip_end = FARTHEST * float(np.linalg.norm(farthest))
-    made = bpy.data.objects.new("camera", lens)
+    body = bpy.data.objects.new("camera", lens)
     right, up, forward = camera.axes
-    made.matrix_world = _matrix(right, up, -forward, camera.position)
-    return made
+    body.matrix_world = _matrix(right, up, -forward, camera.position)
+    return body
 
 
 def _matrix(x: Array, y: Array, z: Array, position: Vec3) -> list[list[float]]:
-    """The matrix to world space, of axes and origin; Blender reads a list as columns."""
+    """Return the matrix to world space from axes and origin. Blender reads a list as columns."""
     return [[*map(float, column), last] for column, last in ((x, 0.0), (y, 0.0), (z, 0.0), (position, 1.0))]
 
 
 class _Nodes:
-    """A node tree that is built bottom up; inputs are constants or sockets of other nodes."""
+    """A node tree built bottom up. Inputs are constants or sockets of other nodes."""
 
     def __init__(self, tree: Any) -> None:
         self._tree = tree
         tree.nodes.clear()
 
     def add(self, kind: str, **inputs: Any) -> Any:
-        """A node with these inputs, by name."""
+        """Add a node with inputs by name."""
         node = self._tree.nodes.new(kind)
         for name, source in inputs.items():
             self.join(source, node.inputs[name])
         return node
 
     def join(self, source: Any, socket: Any) -> None:
-        """Give an input its constant or its link."""
+        """Set an input to a constant, or link it."""
         if isinstance(source, float | tuple):
             socket.default_value = source
         else:
             self._tree.links.new(source, socket)
 
     def value(self, color: Vec3) -> Any:
-        """A constant colour as a socket."""
+        """Return a constant colour as a socket."""
         node = self.add("ShaderNodeCombineXYZ", X=color[0], Y=color[1], Z=color[2])
         return node.outputs[0]
 
     def vector(self, operation: str, a: Any, b: Any) -> Any:
-        """`a` and `b` by a vector operation."""
+        """Apply a vector operation to `a` and `b`."""
         node = self._tree.nodes.new("ShaderNodeVectorMath")
         node.operation = operation
         self.join(a, node.inputs[0])
@@ -194,7 +194,7 @@ class _Nodes:
         return node.outputs["Value" if operation == "DOT_PRODUCT" else "Vector"]
 
     def math(self, a: Any, factor: Any, summand: float, *, clamp: bool = False) -> Any:
-        """a * factor + summand, clamped to [0, 1] if wished."""
+        """Compute a * factor + summand, clamped to [0, 1] on request."""
         node = self._tree.nodes.new("ShaderNodeMath")
         node.operation, node.use_clamp = "MULTIPLY_ADD", clamp
         for source, socket in zip((a, factor, summand), node.inputs, strict=True):

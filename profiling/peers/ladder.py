@@ -1,4 +1,4 @@
-"""Peers on the ladder of 1, 2, 4, ... paths a pixel: time and error of each rung, kept on disk once it is measured."""
+"""Measuring peers on a ladder of 1, 2, 4, ... paths a pixel: time and error of each rung, saved once measured."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from deferred_ir.scene.scene import Scene
 from deferred_ir.truth import metrics
 
 ENOUGH = min(TARGETS) / 1.5
-"""The ladder ends below this error: the least that is asked for lies between two rungs then."""
+"""The ladder ends below this error, so that the smallest target lies between two rungs."""
 BUDGET = 90e3
-"""Milliseconds of rendering that a peer has for all rungs; a rung that would go beyond is not begun."""
+"""Milliseconds of rendering for all rungs of a peer; a rung that would exceed it is not started."""
 QUICK = 5e3
-"""Milliseconds: a rung has all seeds if they are likely to take less together, else the first alone."""
+"""Milliseconds: a rung is measured with all seeds if that is likely to take less, else with the first."""
 MOST_SPP = 1 << 14
 STALLED, STALLS = 0.95, 2
-"""The ladder also ends after so many rungs in a row with more than this part of the error of the one before."""
+"""The ladder also ends after STALLS rungs in a row with more than STALLED times the error of the one before."""
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What all peers render and are held against. size: (width, height)."""
+    """What all peers render and are compared with. size: (width, height)."""
 
     scene: Scene
     size: tuple[int, int]
@@ -45,16 +45,16 @@ class Course:
 
     @property
     def bounces(self) -> int:
-        """Of indirect light."""
+        """Bounces of indirect light."""
         return int(self.scene.render.set.get("vpl.bounces", 1))
 
     def key(self, peer: str, spp: int, seed: int) -> PeerKey:
-        """What the point depends on."""
+        """Return the key of a point."""
         return PeerKey(self.scene.hash, list(self.size), self.bounces, peer, spp, seed)
 
 
 def choose(text: str | None) -> Sequence[str]:
-    """The peers of `--peers A,B|none`, all without it; SettingError for a name that is none's."""
+    """Return the peers of `--peers A,B|none`, all without it. Raises SettingError for an unknown name."""
     if text is None:
         return NAMES
     names = list(dict.fromkeys(name for part in text.split(",") if (name := part.strip())))
@@ -71,7 +71,7 @@ def choose(text: str | None) -> Sequence[str]:
 
 
 def run(course: Course, folder: Path, names: Sequence[str]) -> Peers:
-    """Measure what is not in `folder` yet. A peer that is not there, or fails, gets a note, also on stderr."""
+    """Measure what is not in `folder` yet. A peer that is missing or fails gets a note, also on standard error."""
     points: list[PeerPoint] = []
     notes: dict[str, str] = {}
     for name in names:
@@ -80,7 +80,7 @@ def run(course: Course, folder: Path, names: Sequence[str]) -> Peers:
             notes[name] = f"{missing}; pip install {peer_process.module(name).INSTALL}"
         else:
             try:
-                for point in _measured(course, folder, name):
+                for point in _measure(course, folder, name):
                     points.append(point)
             except Error as error:
                 notes[name] = str(error)
@@ -91,8 +91,8 @@ def run(course: Course, folder: Path, names: Sequence[str]) -> Peers:
     return Peers(peer_points.sort(points), notes)
 
 
-def _measured(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
-    """The rungs of one peer; its process starts at the first that is not on disk."""
+def _measure(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
+    """Yield the points of one peer. Its process starts for the first point that is not on disk."""
     log = peer_points.make_folder(folder) / f"{name}.log"
     with (
         ExitStack() as stack,
@@ -107,9 +107,10 @@ def _measured(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
             if point is None or (point.reference, point.mask) != (course.truth.hash, course.mask.hash):
                 bar.label(f"{name}, {spp} paths, seed {seed}")
                 if process is None:
-                    made = peer_process.PeerProcess(name, course.scene, course.size, course.bounces, log)
-                    process = stack.enter_context(made)
-                point = _point(course, key, process)
+                    process = stack.enter_context(
+                        peer_process.PeerProcess(name, course.scene, course.size, course.bounces, log)
+                    )
+                point = _render_point(course, key, process)
                 peer_points.save(folder, point)
             bar.advance(point.ms)
             return point
@@ -118,7 +119,7 @@ def _measured(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
 
 
 def climb(measure: Callable[[int, int], PeerPoint], seeds: int) -> Iterator[PeerPoint]:
-    """Points by `measure(spp, seed)`, until the error is small enough, falls no longer, or the time is used up."""
+    """Yield points of `measure(spp, seed)` until the error is small enough or stalls, or the time is used up."""
     spent, ahead, spp = 0.0, 0.0, 1
     last, stalls = math.inf, 0
     while spp <= MOST_SPP and spent + ahead <= BUDGET and stalls < STALLS:
@@ -136,7 +137,7 @@ def climb(measure: Callable[[int, int], PeerPoint], seeds: int) -> Iterator[Peer
         spp *= 2
 
 
-def _point(course: Course, key: PeerKey, process: peer_process.PeerProcess) -> PeerPoint:
+def _render_point(course: Course, key: PeerKey, process: peer_process.PeerProcess) -> PeerPoint:
     rendered = process.render(key.spp, key.seed)
     image, truth = rendered.radiance, course.truth
     trimmed, untrimmed = metrics.relmse(image, truth.radiance, truth.hit)

@@ -1,7 +1,7 @@
 """Mitsuba 3's path tracer on the CPU, with the scene and the light of docs/conventions.md.
 
-The spotlight is Mitsuba's `spot`, with cos(theta) cone(theta) as the texture that it projects. What it cannot have: a
-light with a radius, a cone too wide for that texture, and vertex colours that vary over an image texture.
+The spotlight is Mitsuba's `spot`, with cos(theta) cone(theta) as the texture that it projects. Not possible: a light
+with a radius, a cone too wide for that texture, and vertex colours that vary over an image texture.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from deferred_ir.scene.scene import Scene
 INSTALL = "mitsuba"
 
 VARIANTS = ("llvm_ad_rgb", "scalar_rgb")
-"""The fastest first. Without CUDA: peers run on the CPU, all of them."""
+"""Variants of Mitsuba, the fastest first. None uses CUDA, since all peers run on the CPU."""
 PROBE = """
 import sys, mitsuba, numpy
 mitsuba.set_variant(sys.argv[1])
 scene = mitsuba.load_dict({**mitsuba.cornell_box(), "integrator": {"type": "path", "max_depth": 3}})
 sys.exit(not numpy.isfinite(numpy.asarray(mitsuba.render(scene, spp=1))).all())
 """
-"""LLVM aborts the process where it is too old for the kernels, so another process tries."""
+"""A program that tries a variant. It runs in a process of its own: LLVM aborts if it is too old for the kernels."""
 LANES = 1 << 24
-"""Paths at once: LLVM's variant keeps the state of all of them in memory."""
+"""Most paths at once, since the LLVM variant holds the state of all of them in memory."""
 SOON = 5000.0
-"""Milliseconds. An image of a new kernel that takes longer is not rendered again only to leave its compilation out."""
+"""Milliseconds. A first image that takes longer is not rendered again to leave the kernel's compilation out."""
 
 
 def available() -> str | None:
-    """None if Mitsuba can be used here, else the reason why not."""
+    """Return None if Mitsuba can be used here, else the reason why not."""
     return None if importlib.util.find_spec("mitsuba") else "mitsuba is not installed"
 
 
@@ -59,24 +59,24 @@ class Peer:
         failed = "".join(f", {name} does not work here" for name in VARIANTS[: VARIANTS.index(variant)])
         self.about = f"Mitsuba {mitsuba.__version__}, {variant}{failed}"
         self._pixels = size[0] * size[1]
-        self._scene = mitsuba.load_dict(mitsuba_scene.description(mitsuba, scene.at(0.0), size, bounces))
+        self._scene = mitsuba.load_dict(mitsuba_scene.describe(mitsuba, scene.at(0.0), size, bounces))
         self._warm: set[int] = set()
 
     def render(self, spp: int, seed: int) -> Rendered:
-        """An image of `spp` paths a pixel, a power of two. `ms` leaves the compilation of kernels out."""
-        rendered = self._timed(spp, seed)
+        """Render with `spp` paths a pixel, a power of two. `ms` is without the compilation of kernels."""
+        rendered = self._time(spp, seed)
         if spp not in self._warm and rendered.ms < SOON:
-            rendered = self._timed(spp, seed)
+            rendered = self._time(spp, seed)
         self._warm.add(spp)
         return rendered
 
-    def _timed(self, spp: int, seed: int) -> Rendered:
+    def _time(self, spp: int, seed: int) -> Rendered:
         at_once = min(spp, 1 << max(0, (LANES // self._pixels).bit_length() - 1))
         start = time.perf_counter()
         image: Array | float = 0.0
         for part in range(spp // at_once):
-            made = self._mi.render(self._scene, spp=at_once, seed=seed * spp + part)
-            image = image + np.asarray(made, np.float64) / (spp // at_once)
+            part_image = self._mi.render(self._scene, spp=at_once, seed=seed * spp + part)
+            image = image + np.asarray(part_image, np.float64) / (spp // at_once)
         return Rendered(np.asarray(image, np.float32), (time.perf_counter() - start) * 1e3)
 
 

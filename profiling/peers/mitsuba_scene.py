@@ -1,4 +1,4 @@
-"""A scene of ours as the dictionary from which Mitsuba loads its own."""
+"""Conversion of a scene to the dictionary from which Mitsuba loads its own."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from deferred_ir.scene.scene import Material, Scene
 
 SAMPLER = "multijitter"
 CONE_TEXELS = (1024, 4096)
-"""Edge of the projected texture: least and most."""
+"""Least and most texels along an edge of the projected texture."""
 CONE_STEP = 0.1
-"""Largest step between its texels, as a tangent: linear interpolation then errs by at most 0.13 % on the axis."""
+"""Largest step between texels, as a tangent; linear interpolation then errs by at most 0.13 % on the axis."""
 FAR = 1e3
-"""Where the camera's view ends, as a multiple of what it has to reach."""
+"""Far plane, as a multiple of the distance that the camera has to see."""
 
 
-def description(mi: Any, scene: Scene, size: tuple[int, int], bounces: int) -> dict[str, Any]:
-    """What `mitsuba.load_dict` takes, `mi` being mitsuba with a variant set. SettingError for what it cannot render."""
+def describe(mi: Any, scene: Scene, size: tuple[int, int], bounces: int) -> dict[str, Any]:
+    """Return the input of `mitsuba.load_dict`. mi: mitsuba with a variant set. Raises SettingError for other scenes."""
     shapes = {
         f"mesh_{number}_{smooth}": _mesh(mi, scene, number, faces, smooth=smooth)
         for number in range(len(scene.materials))
@@ -77,7 +77,7 @@ def _spot(mi: Any, light: Spotlight) -> dict[str, Any]:
 
 
 def _profile(light: Spotlight) -> Array:
-    """cos(theta) cone(theta) over the image plane of the light, its edge at tan(fov/2): float32 (n, n)."""
+    """Return cos(theta) cone(theta) over the light's image plane up to tan(fov/2), float32 (n, n)."""
     tangent = np.tan(np.radians(light.fov) / 2)
     least, most = CONE_TEXELS
     texels = least
@@ -95,7 +95,7 @@ def _profile(light: Spotlight) -> Array:
 
 
 def _split(scene: Scene, faces: Ints) -> list[tuple[bool, Ints]]:
-    """`faces` without and with shading normals of the file, each only if there are any."""
+    """Split `faces` into those without and with shading normals of the file; empty ones are left out."""
     geometry = scene.geometry
     smooth: Bools = np.zeros(len(faces), np.bool_)
     if geometry.normals is not None:
@@ -105,7 +105,7 @@ def _split(scene: Scene, faces: Ints) -> list[tuple[bool, Ints]]:
 
 
 def _mesh(mi: Any, scene: Scene, number: int, faces: Ints, *, smooth: bool) -> Any:
-    """The triangles `faces`, all of material `number`."""
+    """Build a mesh of the triangles `faces`, all of material `number`."""
     geometry, material = scene.geometry, scene.materials[number]
     used, corners = np.unique(geometry.faces[faces], return_inverse=True)
     textured = material.texture is not None and geometry.uvs is not None
@@ -158,6 +158,6 @@ def _reflectance(mi: Any, scene: Scene, material: Material, albedo: Array, color
 
 
 def _bitmap(mi: Any, pixels: Array, wrap: str = "repeat") -> dict[str, Any]:
-    """A texture of linear values, float32 (H, W, 1 or 3), taken as they are."""
+    """Return a texture of linear values, float32 (H, W, 1 or 3)."""
     bitmap = mi.Bitmap(np.ascontiguousarray(pixels, np.float32))
     return {"type": "bitmap", "bitmap": bitmap, "raw": True, "filter_type": "bilinear", "wrap_mode": wrap}

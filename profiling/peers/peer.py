@@ -1,4 +1,4 @@
-"""Renderers that deferred-ir is held against: path tracers that render the same scene, each in a process of its own.
+"""The interface of peers: path tracers that render the same scene for comparison, each in a process of its own.
 
 A peer is a module of this package with `INSTALL` (what pip installs), `available()` and a class `Peer`, a `Renderer`.
 Its library is imported in that process only.
@@ -13,14 +13,15 @@ from deferred_ir.base.arrays import Array
 from deferred_ir.scene.scene import Scene
 
 NAMES = ("mitsuba", "cycles")
-"""The modules of this package that are peers, in the order of tables."""
+"""The modules of this package that are peers, in the order of the tables."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rendered:
-    """One image of a peer. radiance: float32 (H, W, 3), top row first, mean over each pixel. ms: wall time.
+    """One image of a peer. radiance: float32 (H, W, 3), top row first, mean over each pixel.
 
-    `ms` is what a warm renderer takes from asking to having the image in memory: scene loaded, kernels compiled.
+    ms: wall time from the call to a warm renderer, with scene loaded and kernels compiled, until the image is in
+    memory.
     """
 
     radiance: Array
@@ -30,7 +31,7 @@ class Rendered:
 class Renderer(Protocol):
     """A peer with one scene loaded: direct light and `bounces` diffuse bounces, as docs/conventions.md defines them.
 
-    Making one raises SettingError for a scene that it cannot render as that document says.
+    The constructor raises SettingError for a scene that the peer cannot render as that document says.
     """
 
     about: str
@@ -39,14 +40,14 @@ class Renderer(Protocol):
     def __init__(self, scene: Scene, size: tuple[int, int], bounces: int) -> None: ...
 
     def render(self, spp: int, seed: int) -> Rendered:
-        """An image of `spp` paths a pixel, through the peer's denoiser if it has one."""
+        """Render with `spp` paths a pixel, and denoise if the peer has a denoiser."""
 
 
 class Module(Protocol):
-    """What this package's modules offer."""
+    """What a module of a peer offers."""
 
     INSTALL: str
     Peer: type[Renderer]
 
     def available(self) -> str | None:
-        """None if the peer can be used here, else the reason why not."""
+        """Return None if the peer can be used here, else the reason why not."""

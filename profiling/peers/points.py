@@ -1,4 +1,4 @@
-"""What was measured of peers, as files: one peer, number of paths a pixel and seed each; and why there is none."""
+"""Points of peers as files: one peer, number of paths a pixel and seed each; and notes on why points are missing."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NOTES = "notes.json"
 
 @dataclass(frozen=True)
 class PeerKey:
-    """What a point depends on. size: [width, height]; spp: paths a pixel."""
+    """Everything that a point depends on. size: [width, height]. spp: paths a pixel."""
 
     scene_hash: str
     size: list[int]
@@ -35,10 +35,10 @@ class PeerKey:
 
 @dataclass(frozen=True)
 class PeerPoint:
-    """One image of a peer. about: its version; ms: wall time; reference, mask: hashes of what it was held against.
+    """One image of a peer. about: its version. ms: wall time. reference, mask: hashes of what it was compared with.
 
-    relmse, relmse_untrimmed and bias are over all pixels that show a surface, so they hold what a pixel's average and
-    its centre differ by; relmse_masked is over the pixels without an edge, None where none is left.
+    relmse, relmse_untrimmed and bias are over all pixels that show a surface, so they include the difference between a
+    pixel's mean and its centre. relmse_masked is over the pixels without an edge, None if there are none.
     """
 
     key: PeerKey
@@ -55,36 +55,36 @@ class PeerPoint:
 
 @dataclass(frozen=True)
 class Peers:
-    """Points by peer, paths and seed, and for peers of which points are missing the reason."""
+    """Points in order, and notes on peers without points or with missing ones."""
 
     points: Sequence[PeerPoint] = ()
     notes: Mapping[str, str] = field(default_factory=dict)
 
 
 def path(folder: Path, key: PeerKey) -> Path:
-    """Where the point lies under the output folder."""
+    """Return the path of a point in the output folder."""
     return folder / FOLDER / f"{key.name}.json"
 
 
 def save(folder: Path, point: PeerPoint) -> None:
-    """Write the point whole."""
+    """Write the point."""
     write_json(path(folder, point.key), asdict(point))
 
 
 def read(file: Path) -> PeerPoint | None:
-    """The point in `file`, None if it is missing, half-written, or not what its name says."""
+    """Read the point in `file`. Returns None if it is missing, incomplete, or not what its name says."""
     try:
         data = json.loads(file.read_text(encoding="utf-8"))
         if data.keys() != {f.name for f in fields(PeerPoint)} or not data["ms"] > 0:
             return None
         point = PeerPoint(**{**data, "key": PeerKey(**data["key"])})
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        return None  # it is measured again
+        return None  # the point is measured again
     return point if point.key.name == file.stem else None
 
 
 def make_folder(folder: Path) -> Path:
-    """The folder for peers' points, created if need be; OutputError if it cannot be."""
+    """Create the folder of peers' points if it is missing. Returns it; raises OutputError."""
     try:
         (folder / FOLDER).mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -93,14 +93,14 @@ def make_folder(folder: Path) -> Path:
 
 
 def save_notes(folder: Path, notes: Mapping[str, str]) -> None:
-    """Keep the notes for the report of a merge."""
+    """Save the notes for the report of a merge."""
     write_json(make_folder(folder) / NOTES, dict(notes))
 
 
 def merge(
     sources: Sequence[Path], target: Path, *, scene_hash: str, size: Sequence[int], reference: str
 ) -> tuple[Peers, int]:
-    """Copy what folders hold of peers to `target`, and how many files were unusable or of something else."""
+    """Copy peers' points and notes to `target`. Returns them, and the number of files unusable or of another sweep."""
     points: dict[str, PeerPoint] = {}
     notes: dict[str, str] = {}
     broken = 0
@@ -131,5 +131,5 @@ def _notes(file: Path) -> dict[str, str]:
 
 
 def sort(points: Iterable[PeerPoint]) -> list[PeerPoint]:
-    """By peer, paths and seed."""
+    """Sort points by peer, number of paths and seed."""
     return sorted(points, key=lambda point: (NAMES.index(point.key.peer), point.key.spp, point.key.seed))

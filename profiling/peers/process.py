@@ -1,4 +1,4 @@
-"""A peer in a process of its own: what it prints goes to a log, and its crash is no crash of ours."""
+"""A peer in a process of its own: its output goes to a log, and its crash does not end ours."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from deferred_ir.profiling.peers.peer import Rendered
 from deferred_ir.scene.scene import Scene
 
 LIMIT = 600.0
-"""Seconds for which a peer is waited for."""
+"""Longest wait for an answer, seconds."""
 GRACE = 5.0
-"""Seconds that a peer gets to end by itself."""
+"""Longest wait for a process to end by itself, seconds."""
 
 
 class PeerError(Error):
-    """A peer that can render nothing more."""
+    """A peer cannot load the scene or render."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +46,12 @@ class _Task:
 
 
 def module(name: str) -> Any:
-    """The peer's module, see peer.Module; nothing of the peer's library is imported by that."""
+    """Import a peer's module, see peer.Module; that does not import the peer's library."""
     return importlib.import_module(f"deferred_ir.profiling.peers.{name}")
 
 
 class PeerProcess:
-    """The peer `name` with `scene` loaded, until it is closed. PeerError where that, or rendering, does not work."""
+    """A process of the peer `name` with `scene` loaded; a context manager. Raises PeerError, also from `render`."""
 
     def __init__(self, name: str, scene: Scene, size: tuple[int, int], bounces: int, log: Path) -> None:
         self._log = log
@@ -61,7 +61,7 @@ class PeerProcess:
         self._process = context.Process(target=serve, args=(theirs, task), daemon=True, name=f"peer {name}")
         # Another thread waits for answers: Python gives Ctrl-C at once to a main thread that waits for a thread.
         self._waiting = ThreadPoolExecutor(1)
-        with _interrupts_held_back():
+        with _block_interrupts():
             self._process.start()
         theirs.close()
         try:
@@ -77,7 +77,7 @@ class PeerProcess:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         if kind is None:
-            with suppress(OSError):  # it has ended already
+            with suppress(OSError):  # the process has ended already
                 self._end.send(None)
             self._process.join(GRACE)
         self._kill()
@@ -85,11 +85,11 @@ class PeerProcess:
             self._log.unlink(missing_ok=True)
 
     def render(self, spp: int, seed: int) -> Rendered:
-        """An image of `spp` paths a pixel."""
+        """Render with `spp` paths a pixel."""
         try:
             self._end.send((spp, seed))
         except OSError:
-            raise PeerError(self._epitaph()) from None
+            raise PeerError(self._describe_end()) from None
         rendered: Rendered = self._answer()
         return rendered
 
@@ -99,12 +99,12 @@ class PeerProcess:
         except TimeoutError:
             raise PeerError(f"gave no answer for {LIMIT:g} s; see {self._log}") from None
         except (EOFError, OSError):
-            raise PeerError(self._epitaph()) from None
+            raise PeerError(self._describe_end()) from None
         if isinstance(answer, _Refusal):
             raise PeerError(answer.why)
         return answer
 
-    def _epitaph(self) -> str:
+    def _describe_end(self) -> str:
         self._process.join(GRACE)
         code = self._process.exitcode
         how = f"signal {-code}" if code is not None and code < 0 else f"exit status {code}"
@@ -119,8 +119,8 @@ class PeerProcess:
 
 
 @contextmanager
-def _interrupts_held_back() -> Iterator[None]:
-    """What starts inside never sees Ctrl-C, which a terminal sends to all: who started it ends it."""
+def _block_interrupts() -> Iterator[None]:
+    """Block Ctrl-C, which a terminal sends to all processes, in processes started inside; their parent ends them."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
@@ -132,7 +132,7 @@ def _interrupts_held_back() -> Iterator[None]:
 
 
 def serve(end: Connection, task: _Task) -> None:
-    """What runs in the peer's process: loads the scene, then renders what is asked for until None comes."""
+    """Run in the peer's process: load the scene, then render on request until None comes."""
     to_log = os.open(task.log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o666)
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
@@ -144,11 +144,11 @@ def serve(end: Connection, task: _Task) -> None:
         while (wanted := end.recv()) is not None:
             end.send(peer.render(*wanted))
     except EOFError:
-        return  # whoever asked has gone
+        return  # the parent has ended
     except Error as error:
         end.send(_Refusal(str(error)))
-    except Exception as error:  # of a library: it is told in a line, its traceback is in the log
+    except Exception as error:  # a library's: one line for the user, the traceback in the log
         traceback.print_exc()
-        sys.stderr.flush()  # before the answer, upon which this process may be ended
+        sys.stderr.flush()  # before the answer, after which the parent may end this process
         line = " ".join(str(error).split())[:200]
         end.send(_Refusal(f"{type(error).__name__}: {line}; see {task.log}"))

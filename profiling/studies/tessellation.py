@@ -92,7 +92,7 @@ def costs(scene: Scene, chosen: Mapping[Name, Mapping[str, Any]], turns: int) ->
         }
 
 
-def mismatch(scene: Scene, settings: Mapping[str, Any], pairs: int) -> visibility.Share:
+def mismatch(scene: Scene, settings: Mapping[str, Any], pairs: int) -> visibility.Fraction:
     """Return the fraction of the pairs of a pixel and a VPL on which map and ray disagree."""
     options = visibility.Options(SIZE, pairs, (MAP_SIZE,), settings={**SETTINGS, **settings})
     return next(row.mismatch for row in visibility.rows(scene, options) if row.lights == "vpls")

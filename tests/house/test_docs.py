@@ -93,7 +93,7 @@ def test_commands_print_what_the_page_shows(shown, tmp_path, monkeypatch, capsys
 
 def test_tables_of_passes_are_up_to_date():
     page = pass_tables.PAGE.read_text(encoding="utf-8")
-    assert pass_tables.updated(page) == page, "run: python tools/pass_tables.py"
+    assert pass_tables.update(page) == page, "run: python tools/pass_tables.py"
 
 
 def test_the_worked_example_of_a_pass_draws_what_it_says(tmp_path, renderer):

@@ -41,7 +41,7 @@ def browser(tmp_path, monkeypatch):
 @pytest.mark.parametrize(("end", "height"), [(700, 732), (5000, 5032), (90000, look.TALLEST)])
 def test_a_screenshot_ends_where_the_page_ends(browser, tmp_path, end, height):
     browser(BROWSER.format(python=sys.executable, end=end))
-    look.screenshot(tmp_path / "page.html", tmp_path / "page.png")
+    look.save_screenshot(tmp_path / "page.html", tmp_path / "page.png")
     with Image.open(tmp_path / "page.png") as image:
         assert image.size == (look.WIDTH, height)
 
@@ -49,19 +49,19 @@ def test_a_screenshot_ends_where_the_page_ends(browser, tmp_path, end, height):
 def test_an_empty_page_is_no_picture(browser, tmp_path):
     browser(BROWSER.format(python=sys.executable, end=0))
     with pytest.raises(SystemExit, match=r"page\.html: shows nothing"):
-        look.screenshot(tmp_path / "page.html", tmp_path / "page.png")
+        look.save_screenshot(tmp_path / "page.html", tmp_path / "page.png")
 
 
 def test_a_browser_that_fails_is_quoted(browser, tmp_path):
     browser("#!/bin/sh\necho no display >&2; exit 7\n")
     with pytest.raises(SystemExit, match="chromium: no picture, exit status 7\nno display"):
-        look.screenshot(tmp_path / "page.html", tmp_path / "page.png")
+        look.save_screenshot(tmp_path / "page.html", tmp_path / "page.png")
 
 
 def test_a_missing_browser_is_named(browser, tmp_path):
     del browser
     with pytest.raises(SystemExit, match="no browser: install one of chromium, "):
-        look.screenshot(tmp_path / "page.html", tmp_path / "page.png")
+        look.save_screenshot(tmp_path / "page.html", tmp_path / "page.png")
     done = subprocess.run(
         [sys.executable, look.ROOT / "tools" / "system.py", "browser"], capture_output=True, text=True, check=False
     )

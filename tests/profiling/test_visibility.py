@@ -58,7 +58,7 @@ def frame(renderer):
         one = renderer(size, visibility.GRAPH, set=given, passes=visibility.PASSES)
         plan = one.plan(scene, outputs=[lights])
         one.draw(scene, plan, seed=seed)
-        return visibility.judged(one, scene, lights), one
+        return visibility.trace_pairs(one, scene, lights), one
 
     return draw
 
@@ -123,7 +123,7 @@ def test_the_maps_answer_is_what_lighting_takes(frame, renderer):
 
 def test_the_camera_turns_by_the_pixels_it_is_told():
     camera = Camera((1.0, 2.0, 3.0), (-0.5, 0.3, -4.0), fov=70.0)
-    turned = visibility._turned(camera, (80, 40), np.array([0.5, -0.5]))
+    turned = visibility._turn(camera, (80, 40), np.array([0.5, -0.5]))
     ray = camera.rays((80, 40))[20, 40]  # the pixel to the right of the middle and below
     np.testing.assert_allclose(turned.axes[2], ray / np.linalg.norm(ray), atol=1e-12)
 
@@ -155,7 +155,7 @@ def test_a_good_map_errs_at_the_edge_of_the_shadow_only(frame):
 def test_with_nothing_in_between_map_and_ray_agree():
     for row in rows(between(), pairs=20_000).values():
         assert row.pairs >= 20_000
-        assert row.mismatch == row.leaks == row.false_shadows == visibility.Share(0.0, 0.0)
+        assert row.mismatch == row.leaks == row.false_shadows == visibility.Fraction(0.0, 0.0)
 
 
 def test_coarse_maps_have_false_shadows_and_leaks():
@@ -207,18 +207,18 @@ def test_leaks_and_false_shadows_are_told_apart_and_weighted():
 def test_a_share_has_the_spread_of_its_frames():
     """Frames of one size: the standard error of a mean. Of any sizes: none where all have the same share."""
     parts = np.array([3.0, 5.0, 4.0, 8.0])
-    share = visibility._share(parts, np.full(4, 100.0))
-    assert share.value == pytest.approx(0.05)
-    assert share.error == pytest.approx(np.std(parts / 100, ddof=1) / 2)
+    fraction = visibility._divide(parts, np.full(4, 100.0))
+    assert fraction.value == pytest.approx(0.05)
+    assert fraction.error == pytest.approx(np.std(parts / 100, ddof=1) / 2)
     sizes = np.array([10.0, 40.0, 30.0])
-    assert visibility._share(0.1 * sizes, sizes).error == pytest.approx(0, abs=1e-12)
-    assert visibility._share(np.zeros(3), np.zeros(3)) == visibility.Share(None, None)
+    assert visibility._divide(0.1 * sizes, sizes).error == pytest.approx(0, abs=1e-12)
+    assert visibility._divide(np.zeros(3), np.zeros(3)) == visibility.Fraction(None, None)
 
 
 def test_standard_errors_tell_how_far_other_seeds_are():
     found = [rows(room(), sizes=(32,), pairs=4000, seed=seed)["vpls"].mismatch for seed in range(6)]
-    spread = np.std([share.value for share in found], ddof=1)
-    told = np.mean([share.error for share in found])
+    spread = np.std([each.value for each in found], ddof=1)
+    told = np.mean([each.error for each in found])
     assert 0.3 < spread / told < 3
 
 
@@ -247,7 +247,7 @@ def test_where_no_pixel_faces_a_light_there_are_no_figures():
     scene = replace(room(), camera=Camera((0.0, 5.0, 0.0), (0.0, 9.0, 0.0), up=(1.0, 0.0, 0.0)))
     row = rows(scene)["vpls"]
     assert row.pairs == 0
-    assert row.mismatch == visibility.Share(None, None)
+    assert row.mismatch == visibility.Fraction(None, None)
     assert row.frames == visibility.LEAST_FRAMES
 
 

@@ -41,15 +41,12 @@ Centre read_centre(ivec2 pixel, ivec2 size) {
     return c;
 }
 
-// Whether the pixel `other` lies in the frame and shows a surface in the plane of the centre's.
-bool in_plane(Centre c, ivec2 other) {
-    float d = texelFetch(depth, other, 0).r;
-    vec2 away = vec2(other - c.pixel);
+// Whether a surface on the ray `ray`, at the reversed depth `d`, lies in the plane of the centre's.
+bool in_plane(Centre c, vec3 ray, float d) {
     // From the centre's point to the other's, times both depths / near: no division, and 0 for the centre itself.
-    vec3 off = (c.ray + c.across * away.x + c.up * away.y) * c.depth - c.ray * d;
+    vec3 off = ray * c.depth - c.ray * d;
     float height = dot(c.normal, off);
-    bool inside = all(lessThan(uvec2(other), uvec2(c.size)));
-    return inside && d > 0.0 && height * height <= sine_squared * dot(off, off);
+    return d > 0.0 && height * height <= sine_squared * dot(off, off);
 }
 
 vec2 read_code(ivec2 pixel) {
@@ -61,6 +58,14 @@ bool alike(Centre c, vec2 code) {
     vec3 n = octahedron(round_normal(code));
     float likeness = dot(c.shading_normal, n);
     return likeness >= 0.0 && likeness * likeness >= cosine_squared * dot(n, n);
+}
+
+// Whether the pixel `other`, anywhere, lies in the frame and on the centre's surface.
+bool counts(Centre c, ivec2 other) {
+    vec2 away = vec2(other - c.pixel);
+    bool inside = all(lessThan(uvec2(other), uvec2(c.size)));
+    return inside && in_plane(c, c.ray + c.across * away.x + c.up * away.y, texelFetch(depth, other, 0).r)
+        && alike(c, read_code(other));
 }
 
 // Sets of up to 64 numbers, in words of 32 bits.
@@ -91,12 +96,21 @@ void main() {
         return;
     }
     uvec2 bent = uvec2(0u);  // taps in the plane with a normal of their own
-    for (int tap = 0; tap < TAPS; ++tap) {
-        ivec2 other = tap_pixel(corner, tap);
-        if (in_plane(c, other)) {
-            if (read_code(other) == c.code) found |= only(tap);
-            else bent |= only(tap);
+    vec3 columns[N];
+    for (int i = 0; i < N; ++i) columns[i] = c.ray + c.across * float(corner.x + i - pixel.x);
+    uint inside = (1u << min(N, size.x)) - 1u;  // a frame may be smaller than the window
+    for (int row = 0; row < min(N, size.y); ++row) {
+        vec3 up = c.up * float(corner.y + row - pixel.y);
+        uint same = 0u, other = 0u;
+        for (int i = 0; i < N; ++i) {
+            ivec2 tap = corner + ivec2(i, row);
+            bool plane = in_plane(c, columns[i] + up, texelFetch(depth, tap, 0).r), equal = read_code(tap) == c.code;
+            same |= uint(plane && equal) << i;
+            other |= uint(plane && !equal) << i;
         }
+        int word = WORDS > 1 ? row * N >> 5 : 0;
+        found[word] |= (same & inside) << (row * N & 31);
+        bent[word] |= (other & inside) << (row * N & 31);
     }
     if (!alike(c, c.code)) found = uvec2(0u);
     // Few normals are to be compared where surfaces are flat. The loop takes as many turns as the pixel with most has.
@@ -116,8 +130,7 @@ void main() {
             absent |= only(place.y * N + place.x);
             bool there = false;
             for (int i = 0; i < tries && !there; ++i) {  // in x, in y, in both
-                ivec2 across = other + away * ivec2(i != 1, i != 0);
-                there = in_plane(c, across) && alike(c, read_code(across));
+                there = counts(c, other + away * ivec2(i != 1, i != 0));
                 if (there && i != 1) x |= only(tap);
                 if (there && i != 0) y |= only(tap);
             }

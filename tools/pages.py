@@ -30,13 +30,13 @@ class Block:
 
 
 def pages() -> list[Path]:
-    """The README and all pages of docs."""
+    """List the README and all pages of docs."""
     return [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def blocks(page: Path) -> list[Block]:
-    """The code blocks of a page, in order."""
-    return [Block(*found) for found in _FENCE.findall(page.read_text(encoding="utf-8"))]
+    """List the code blocks of a page in order."""
+    return [Block(*parts) for parts in _FENCE.findall(page.read_text(encoding="utf-8"))]
 
 
 def _outside_blocks(page: Path) -> str:
@@ -44,7 +44,7 @@ def _outside_blocks(page: Path) -> str:
 
 
 def commands(page: Path) -> Iterator[tuple[list[str], str]]:
-    """The `deferred-ir` commands of a page as words, each with the output that the page shows ("" if none)."""
+    """Yield the `deferred-ir` commands of a page as words, each with the output shown on the page ("" if none)."""
     for block in blocks(page):
         if block.language == "sh":
             yield from ((words, "") for line in block.text.splitlines() if (words := _words(line)))
@@ -59,7 +59,7 @@ def commands(page: Path) -> Iterator[tuple[list[str], str]]:
 
 
 def _words(line: str) -> list[str]:
-    """A command line as words; none if it is not ours. What a pipe does with the output is left out."""
+    """Split a `deferred-ir` command line into words, without what follows a pipe. Returns none for others."""
     if not line.startswith("deferred-ir "):
         return []
     words = shlex.split(line, comments=True)
@@ -69,23 +69,23 @@ def _words(line: str) -> list[str]:
 
 
 def picture_commands() -> dict[str, list[str]]:
-    """The command that makes each picture of the docs, by the picture's file name."""
-    found = {}
+    """Return the command that makes each picture of the docs, by the picture's file name."""
+    result = {}
     for page in pages():
         for words, _ in commands(page):
             for flag, value in pairwise(words):
                 if flag == "-o" and value.startswith(f"{PICTURES}/"):
-                    found[Path(value).name] = words
-    return found
+                    result[Path(value).name] = words
+    return result
 
 
 def links(page: Path) -> list[str]:
-    """Targets of all links and pictures of a page, outside code blocks."""
+    """List the targets of all links and pictures of a page outside code blocks."""
     return [first or second for first, second in _LINK.findall(_outside_blocks(page))]
 
 
 def anchors(page: Path) -> set[str]:
-    """What `#...` may name on a page: its headings, as GitHub makes anchors of them."""
+    """Return the anchors that `#...` may name on a page: its headings, as GitHub converts them."""
     return {
         re.sub(r"[^\w\- ]", "", heading).strip().lower().replace(" ", "-")
         for heading in _HEADING.findall(_outside_blocks(page))
@@ -93,14 +93,14 @@ def anchors(page: Path) -> set[str]:
 
 
 def paths(page: Path) -> set[str]:
-    """Code spans of a page that are paths in the repository, such as `passes/vpl.py`."""
+    """Return the code spans of a page that are paths in the repository, such as `passes/vpl.py`."""
     return {span for span in re.findall(r"`([^`\n]+)`", _outside_blocks(page)) if re.fullmatch(r"(\w+/)+[\w.-]*", span)}
 
 
 def replace_between(page: str, begin: str, end: str, text: str) -> str:
     """Return a page with the text between two markers replaced."""
-    before, found, rest = page.partition(begin)
+    before, opened, rest = page.partition(begin)
     _, closed, after = rest.partition(end)
-    if not found or not closed:
+    if not opened or not closed:
         raise SystemExit(f"a page has no markers '{begin}' and '{end}'")
     return f"{before}{begin}\n\n{text}\n{end}{after}"

@@ -65,9 +65,9 @@ def section(kind: str, work: Pass, outputs: Mapping[str, Output]) -> list[str]:
 
 def tables() -> str:
     """Return the text between the markers. Outputs are left out for passes that no built-in graph has."""
-    found, lines = steps(), list[str]()
+    shown, lines = steps(), list[str]()
     for kind in file.pass_types():
-        step = found.get(kind)
+        step = shown.get(kind)
         work = step.work if step else importlib.import_module(f"{file.PASSES}.{kind}").PASS()
         lines += section(kind, work, step.outputs if step else {})
     return "\n".join(lines)

@@ -46,13 +46,13 @@ PROBES = {
 
 
 def fault(part: str) -> str:
-    """What is wrong with `part`, "" if nothing; in a fresh process, which sees what apt-get just installed."""
+    """Return what is wrong with `part`, "" if nothing. A new process checks, to see what apt-get just installed."""
     probe = subprocess.run([sys.executable, "-c", PROBES[part]], capture_output=True, text=True, check=False)
     return (probe.stderr.strip().splitlines() or ["no message"])[-1] if probe.returncode else ""
 
 
 def apt_get() -> list[str]:
-    """The command that may install packages, [] if there is none."""
+    """Return the command that may install packages, [] if there is none."""
     if sys.platform != "linux" or not shutil.which("apt-get"):
         return []
     if os.geteuid() == 0:
@@ -63,7 +63,7 @@ def apt_get() -> list[str]:
 
 
 def install(command: list[str], packages: list[str]) -> None:
-    """Updates the package lists and installs; tells of a failure but leaves the verdict to a second look."""
+    """Update the package lists and install. Prints a failure, but leaves the verdict to a second check."""
     environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
     for arguments in (["update"], ["install", "-y", "--no-install-recommends", *packages]):
         done = subprocess.run(
@@ -80,7 +80,7 @@ def install(command: list[str], packages: list[str]) -> None:
 
 
 def main(part: str) -> int:
-    """Exit status 0 if `part` is there, or was installed."""
+    """Install `part` if it is missing. Exit status 0 if it is there."""
     first = fault(part)
     if not first:
         return 0

@@ -1,6 +1,6 @@
 """Compare shadow maps with rays: for pairs of a pixel and a light, do both see the same? A row a projection and size.
 
-A frame pairs each pixel with one light (visibility_pairs.py), and Embree says whether something lies between the two.
+A frame pairs each pixel with one light (visibility_pass.py), and Embree says whether something lies between the two.
 The next frame has other VPLs, other pairs, and a camera turned by less than a pixel. Pairs of one frame share their
 maps and are no independent samples, so a standard error goes by the spread of the frames.
 """

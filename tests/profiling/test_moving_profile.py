@@ -76,7 +76,7 @@ def test_images_of_other_times_are_not_compared(scene_file, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("time", ["soon", "nan", "inf", "1e99"])
-def test_what_is_no_time(time, scene_file, tmp_path, capsys):
+def test_a_time_that_is_no_number_of_seconds_is_refused(time, scene_file, tmp_path, capsys):
     with pytest.raises(SystemExit, match="2"):
         main.main(["reference", scene_file, "-o", str(tmp_path / "r.npy"), "--time", time])
     assert "is no number of seconds" in capsys.readouterr().err
@@ -147,7 +147,7 @@ def rendered(capsys, tmp_path, *extra):
     return [line for line in lines if "VPLs" in line]
 
 
-def test_a_set_that_is_not_full_is_told(tmp_path, capsys):
+def test_a_set_that_is_not_full_is_noted(tmp_path, capsys):
     (line,) = rendered(capsys, tmp_path)
     assert line.startswith("note: 8 of 16 rays for VPLs so far: 2 frames fill the set")
     assert line.endswith("--set vpl.most=16")

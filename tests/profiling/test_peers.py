@@ -19,7 +19,7 @@ from small_scenes import room
 from deferred_ir.base.errors import SettingError
 from deferred_ir.cli.main import main
 
-peer_sweep = import_module("deferred_ir.profiling.peers.ladder")
+ladder = import_module("deferred_ir.profiling.peers.ladder")
 peer_points = import_module("deferred_ir.profiling.peers.points")
 peer_process = import_module("deferred_ir.profiling.peers.process")
 equal_error = import_module("deferred_ir.profiling.sweep.equal_error")
@@ -62,8 +62,8 @@ def fake(monkeypatch):
     state = type("State", (InProcess,), {"rendered": [], "made": [], "fails_at": {}})
     monkeypatch.setattr(peer_process, "PeerProcess", state)
     monkeypatch.setattr(peer_process, "module", lambda name: fake_peer)
-    monkeypatch.setattr(peer_sweep, "ENOUGH", 0.0)
-    monkeypatch.setattr(peer_sweep, "MOST_SPP", 1 << (RUNGS - 1))
+    monkeypatch.setattr(ladder, "ENOUGH", 0.0)
+    monkeypatch.setattr(ladder, "MOST_SPP", 1 << (RUNGS - 1))
     return state
 
 
@@ -269,9 +269,9 @@ def test_a_faulty_name_is_one_line(text, words, tmp_path, capsys):
 
 
 def test_names_of_peers():
-    assert peer_sweep.choose(None) == peers.NAMES
-    assert peer_sweep.choose("none") == ()
-    assert list(peer_sweep.choose(" cycles,mitsuba,cycles")) == ["cycles", "mitsuba"]
+    assert ladder.choose(None) == peers.NAMES
+    assert ladder.choose("none") == ()
+    assert list(ladder.choose(" cycles,mitsuba,cycles")) == ["cycles", "mitsuba"]
     assert main(["profile", "--merge", ".", "-o", "x", "--peers", "none"]) == 2
 
 
@@ -290,27 +290,27 @@ def climbed(ms_a_path, error_of_one, seeds=3):
         error = None if error_of_one is None else error_of_one / spp
         return point(spp, seed, ms_a_path * spp, error)
 
-    return [(made.key.spp, made.key.seed) for made in peer_sweep.climb(measure, seeds)]
+    return [(made.key.spp, made.key.seed) for made in ladder.climb(measure, seeds)]
 
 
 def test_the_ladder_ends_below_the_least_error_that_is_asked_for():
     assert climbed(1.0, 0.01) == [(spp, seed) for spp in (1, 2, 4, 8) for seed in range(3)]
-    assert min(equal_error.TARGETS) > peer_sweep.ENOUGH
+    assert min(equal_error.TARGETS) > ladder.ENOUGH
     assert climbed(1.0, None) == [(1, 0), (1, 1), (1, 2)]
 
 
 def test_the_ladder_ends_with_its_time_and_slow_rungs_have_one_seed():
     rungs = climbed(1000.0, 1e9)
     spent = sum(1000.0 * spp for spp, _ in rungs)
-    assert spent <= peer_sweep.BUDGET < spent + 2000.0 * rungs[-1][0]
+    assert spent <= ladder.BUDGET < spent + 2000.0 * rungs[-1][0]
     assert [seed for spp, seed in rungs if spp == 1] == [0, 1, 2]
     assert [seed for spp, seed in rungs if spp == 2] == [0]
-    assert climbed(1e-3, 1e9, seeds=1)[-1][0] == peer_sweep.MOST_SPP
+    assert climbed(1e-3, 1e9, seeds=1)[-1][0] == ladder.MOST_SPP
 
 
 def test_the_ladder_ends_where_the_error_falls_no_longer():
     errors = {1: 0.4, 2: 0.5, 4: 0.2, 8: 0.199, 16: 0.1, 32: 0.0999, 64: 0.0998}
-    made = peer_sweep.climb(lambda spp, seed: point(spp, seed, 1.0, errors[spp]), 1)
+    made = ladder.climb(lambda spp, seed: point(spp, seed, 1.0, errors[spp]), 1)
     assert [one.key.spp for one in made] == list(errors)
 
 
@@ -422,7 +422,7 @@ def test_a_peer_that_crashes_leaves_one_line_and_its_log(process, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_what_a_peers_library_raises_is_one_line(process, capfd):
+def test_an_error_of_a_peers_library_is_one_line(process, capfd):
     line = r"^RuntimeError: out of luck; see .*\.log$"
     with pytest.raises(peer_process.PeerError, match=line), process() as peer:
         peer.render(fake_peer.RAISES, 0)
@@ -455,7 +455,7 @@ def test_ctrl_c_ends_a_peer_that_renders(process, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_mitsuba_refuses_what_it_cannot_render_before_it_is_needed():
+def test_mitsuba_refuses_a_scene_that_it_cannot_render():
     mitsuba_scene = import_module("deferred_ir.profiling.peers.mitsuba_scene")
     light = room().spotlight
     with pytest.raises(SettingError, match="no radius"):

@@ -193,7 +193,7 @@ def other(**changes):
     [truncate, other(reference="0" * 16), other(device="another"), other(laps=3), other(key={}), lambda p: p.unlink()],
     ids=["truncated", "reference", "device", "laps", "key", "missing"],
 )
-def test_a_point_that_is_not_to_be_trusted_is_measured_again(spoil, copied, measured):
+def test_an_unusable_point_is_measured_again(spoil, copied, measured):
     victim = points(copied)[3]
     spoil(victim)
     assert profile(copied) == 0
@@ -208,7 +208,7 @@ def test_a_point_without_its_picture_is_measured_again(copied, measured):
     assert len(measured) == 1
 
 
-def test_ctrl_c_keeps_what_is_finished(whole, tmp_path, capsys, monkeypatch):
+def test_ctrl_c_saves_finished_points(whole, tmp_path, capsys, monkeypatch):
     (tmp_path / "points").mkdir()
     for name in ("reference.npy", "reference.json"):
         shutil.copy(whole / name, tmp_path)
@@ -253,7 +253,7 @@ def group(graph, vpls, frame_ms, relmse, flagged=False):
     return groups.Group(graph, vpls, 1, frame_ms, relmse, relmse, relmse, flagged)
 
 
-def test_the_pareto_front_is_what_nothing_faster_reaches(whole):
+def test_nothing_faster_beats_the_pareto_front(whole):
     first = sweep_points.read(whole, points(whole)[0].stem)
     figures = {
         ("a", 4): (10, 0.1),
@@ -321,7 +321,7 @@ def test_a_faulty_command_is_one_line(extra, words, tmp_path, capsys, monkeypatc
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_a_reference_of_something_else_is_refused(whole, tmp_path, capsys):
+def test_a_reference_of_another_scene_or_size_is_refused(whole, tmp_path, capsys):
     given = ["-o", str(tmp_path / "out"), "--reference", str(whole / "reference.npy"), "--vpls", "4"]
     line = fault(capsys, "colors", "--size", "32x32", *given)
     assert "shows the scene cornell" in line
@@ -365,7 +365,7 @@ def test_other_faults_of_a_merge(whole, copied, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("library", ["matplotlib", "jinja2"])
-def test_without_the_extra_it_says_what_to_install(library, tmp_path, capsys, monkeypatch):
+def test_without_the_extra_it_names_the_package_to_install(library, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, library, None)
     line = fault(capsys, "cornell", "-o", str(tmp_path / "out"), *SMALL)
     assert library in line

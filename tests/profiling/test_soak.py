@@ -44,7 +44,7 @@ def test_two_rounds_leave_nothing_behind(monkeypatch, capsys):
     ]
 
 
-def test_what_grows_or_differs_is_a_fault():
+def test_growth_and_different_images_are_faults():
     first = Count(10, 1, {"Texture": 4, "Buffer": 2}, 100.0)
     done = Soak(counts=[first, Count(20, 2, {"Texture": 5, "Buffer": 1}, 100.0 + soak.SLACK + 1)])
     for value in (0.0, 0.0, 1.0):

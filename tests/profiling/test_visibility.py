@@ -110,7 +110,7 @@ def test_another_seed_draws_other_pairs(frame):
     assert again.light.tolist() == first.light.tolist()
 
 
-def test_the_maps_answer_is_what_lighting_takes(frame, renderer):
+def test_the_maps_answer_is_that_of_lighting(frame, renderer):
     """Direct light of a grey floor is irradiance times visibility, over pi."""
     pairs, one = frame(blocked(), "spotlight")
     picture = renderer(SIZE, set={"shadow_maps.spot_size": 256, "vpl.count": 0}).render(blocked()).radiance
@@ -121,7 +121,7 @@ def test_the_maps_answer_is_what_lighting_takes(frame, renderer):
     assert picture[~counts].max() == 0
 
 
-def test_the_camera_turns_by_the_pixels_it_is_told():
+def test_the_camera_turns_by_a_number_of_pixels():
     camera = Camera((1.0, 2.0, 3.0), (-0.5, 0.3, -4.0), fov=70.0)
     turned = visibility._turn(camera, (80, 40), np.array([0.5, -0.5]))
     ray = camera.rays((80, 40))[20, 40]  # the pixel to the right of the middle and below
@@ -199,7 +199,7 @@ def pairs_of(shown, lit, irradiance):
     )
 
 
-def test_leaks_and_false_shadows_are_told_apart_and_weighted():
+def test_leaks_and_false_shadows_are_distinguished_and_weighted():
     pairs = pairs_of([1.0, 0.75, 0.5, 0.25, 0.0], [True, False, True, True, False], [1, 2, 4, 8, 16])
     assert pairs.sums().tolist() == [5, 1, 1, 31, 0.75 * 2, 0.5 * 4 + 0.75 * 8]
 
@@ -215,7 +215,7 @@ def test_a_share_has_the_spread_of_its_frames():
     assert visibility._divide(np.zeros(3), np.zeros(3)) == visibility.Fraction(None, None)
 
 
-def test_standard_errors_tell_how_far_other_seeds_are():
+def test_standard_errors_are_the_spread_of_other_seeds():
     found = [rows(room(), sizes=(32,), pairs=4000, seed=seed)["vpls"].mismatch for seed in range(6)]
     spread = np.std([each.value for each in found], ddof=1)
     told = np.mean([each.error for each in found])

@@ -11,7 +11,7 @@ from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.truth.metrics import masked_relmse, relmse
 
-edges = import_module("deferred_ir.profiling.sweep.edge_mask")
+edge_mask = import_module("deferred_ir.profiling.sweep.edge_mask")
 
 SIZE = (40, 30)
 FINE = 16
@@ -22,7 +22,7 @@ ABOVE = Spotlight((0.0, 4.0, 0.0), (0.0, 0.0, 0.0), 100.0)
 
 
 def kept(scene, size=SIZE):
-    return edges.find(scene, size).counts
+    return edge_mask.find(scene, size).counts
 
 
 def on_floor(camera, size):
@@ -121,37 +121,37 @@ def test_facets_of_a_smooth_surface_are_no_edges_but_its_outline_is():
 
 def test_rows_at_once_do_not_show(monkeypatch):
     scene = build(plane(0.6), box((-0.2, 0, -0.2), (0.2, 0.3, 0.2)), camera=DOWN, spotlight=ABOVE)
-    whole = edges.find(scene, SIZE)
-    monkeypatch.setattr(edges, "ROWS", 7)
-    assert edges.find(scene, SIZE).hash == whole.hash
+    whole = edge_mask.find(scene, SIZE)
+    monkeypatch.setattr(edge_mask, "ROWS", 7)
+    assert edge_mask.find(scene, SIZE).hash == whole.hash
 
 
 @pytest.fixture
 def folder(tmp_path):
     rng = np.random.default_rng(1)
-    edges.save(tmp_path, edges.Mask(rng.random((30, 40)) < 0.8), "a" * 16)
+    edge_mask.save(tmp_path, edge_mask.Mask(rng.random((30, 40)) < 0.8), "a" * 16)
     return tmp_path
 
 
 def test_a_mask_comes_back_from_its_files(folder):
-    mask = edges.read(folder, "a" * 16, SIZE)
+    mask = edge_mask.read(folder, "a" * 16, SIZE)
     assert mask.counts.shape == (30, 40)
     assert mask.left_out == pytest.approx(0.2, abs=0.05)
     assert {path.name for path in folder.iterdir()} == {"mask.npy", "mask.json", "mask.png"}
-    assert edges.read(folder, "b" * 16, SIZE) is None
-    assert edges.read(folder, "a" * 16, (30, 40)) is None
+    assert edge_mask.read(folder, "b" * 16, SIZE) is None
+    assert edge_mask.read(folder, "a" * 16, (30, 40)) is None
 
 
 @pytest.mark.parametrize("name", ["mask.npy", "mask.json", "mask.png"])
 @pytest.mark.parametrize("part", [0.0, 0.5, None])
-def test_a_mask_that_is_not_whole_is_made_again(folder, name, part):
+def test_an_incomplete_mask_is_found_again(folder, name, part):
     data = (folder / name).read_bytes()
     if part is None:
         (folder / name).unlink()
     elif name != "mask.png":
         (folder / name).write_bytes(data[: int(part * len(data))])
     whole = part is not None and name == "mask.png"  # for people, and not read
-    assert (edges.read(folder, "a" * 16, SIZE) is None) == (not whole)
+    assert (edge_mask.read(folder, "a" * 16, SIZE) is None) == (not whole)
 
 
 def test_masked_relmse_is_that_of_an_image_of_these_pixels_alone():

@@ -43,12 +43,12 @@ class Gather(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """One texture of the frame's size."""
+        """Return one texture of the frame's size."""
         del inputs
         return {"irradiance": Output("irradiance from the VPLs", Texture("rgba32f"), transient=True)}
 
     def depends(self) -> frozenset[str]:
-        """Lonely pixels' positions follow from the depth and the camera; the seed shifts the window."""
+        """The camera, to reconstruct lonely pixels' positions from the depth; and the seed, which shifts the window."""
         return frozenset({"camera", "seed"})
 
     def execute(self, frame: Frame, io: Io) -> None:
@@ -67,7 +67,7 @@ class Gather(Pass):
         shares = io.meta("vpls", SharesMeta).n ** 2
         block = vpls.description.block
         for start in range(0, len(vpls.records), block):
-            ranges = _ranges(vpls.records, shares, start, start + block)
+            ranges = _find_ranges(vpls.records, shares, start, start + block)
             if not ranges.any():
                 continue
             gpu.barrier()
@@ -77,7 +77,7 @@ class Gather(Pass):
         gpu.barrier()
 
 
-def _ranges(vpls: np.ndarray, shares: int, start: int, stop: int) -> Ints:
+def _find_ranges(vpls: np.ndarray, shares: int, start: int, stop: int) -> Ints:
     """Return where each share begins and ends in the block of VPLs `start` to `stop` (VPL records), int (s, 2)."""
     starts = np.clip(find_share_starts(len(vpls), round(shares**0.5)), start, stop)
     ends = [first + count_shining(vpls[first:end]) for first, end in itertools.pairwise(starts)]

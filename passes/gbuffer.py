@@ -1,4 +1,4 @@
-"""Draw the scene once and keep what lighting needs: -> normals, albedo, depth (20 bytes a pixel).
+"""Draw the scene once into the textures that lighting reads: -> normals, albedo, depth (20 bytes a pixel).
 
 Positions come back from the depth: reversed, in 32 bits, it loses nothing that shows.
 """
@@ -17,7 +17,7 @@ class GBuffer(Pass):
     """Depth, normals and reflectance of the nearest surface in each pixel."""
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Three targets of the frame's size, or fewer."""
+        """Return up to three textures of the frame's size."""
         del inputs
         return {
             "normals": Output(
@@ -28,7 +28,7 @@ class GBuffer(Pass):
         }
 
     def depends(self) -> frozenset[str]:
-        """What the camera sees."""
+        """The camera and the models."""
         return frozenset({"camera", "models"})
 
     def execute(self, frame: Frame, io: Io) -> None:

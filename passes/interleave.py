@@ -31,13 +31,13 @@ class Params:
 
 
 class Interleave(Pass):
-    """The VPLs, one share after the other."""
+    """The VPLs, sorted by share."""
 
     Params = Params
     inputs: ClassVar[Mapping[str, Input]] = {"vpls": Input("the VPLs", format="vpl")}
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """A buffer of as many VPLs, and how they are dealt, for passes that do not change with the VPLs."""
+        """Return the sorted VPLs, and the edge of a block by itself, for passes that do not depend on the VPLs."""
         vpls, n = inputs["vpls"], self.params.n
         assert isinstance(vpls, Buffer)
         if n & (n - 1):
@@ -51,21 +51,21 @@ class Interleave(Pass):
         }
 
     def state_facts(self, facts: Facts) -> Statements:
-        """State into how many shares the VPLs are dealt."""
+        """State the number of shares."""
         del facts
         return {SHARES: self.params.n**2}
 
     def unneeded(self, facts: Facts) -> str | None:
-        """With one share there is nothing to deal."""
+        """Leave the pass out where there is only one share."""
         del facts
         return "n is 1: every pixel is lit by all VPLs" if self.params.n == 1 else None
 
     def depends(self) -> frozenset[str]:
-        """Nothing else."""
+        """Nothing of the frame."""
         return frozenset()
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Shuffle and upload, those without power last in each part of a share that one draw adds up."""
+        """Shuffle and upload the VPLs, those without power last in each run of VPLs that one draw adds up."""
         del frame
         vpls, capacity = io["vpls"].records, io["vpls"].description
         order = deal(vpls["tile"].astype(int), capacity.records)

@@ -1,6 +1,6 @@
 """Light lonely pixels by the VPLs that they miss, with shadow rays: lonely pixels, vpls, G-buffer -> irradiance.
 
-Where VPLs have no maps. The list is read back, and the reference's own sum is made for its pixels on the CPU.
+Runs where VPLs have no maps. The list is read back, and its pixels are lit on the CPU as in a reference by VPLs.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class LightLonelyPixels(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """A texture of the frame's size."""
+        """Return one texture of the frame's size."""
         del inputs
         return {
             "irradiance": Output(
@@ -47,11 +47,11 @@ class LightLonelyPixels(Pass):
         }
 
     def depends(self) -> frozenset[str]:
-        """Rays from what the camera sees; the lights come as an input."""
+        """What the camera sees, and what lies between it and the VPLs."""
         return frozenset({"camera", "models"})
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Read back, trace, upload."""
+        """Read the list and the G-buffer back, trace, upload."""
         width, height = frame.size
         vpls, parts = io["vpls"].records, io["vpls"].description.parts
         count = int(io["lonely_count"].read()[0, 0, 0])
@@ -62,11 +62,11 @@ class LightLonelyPixels(Pass):
         asking = seen.rows(np.flatnonzero(bits[seen.pixel].any(axis=1)))
         image = np.zeros((height * width, 4), np.float32)
         if len(vpls) and len(asking.pixel):
-            image[asking.pixel, :3] = _irradiance(frame.tracer(), asking, vpls, bits[asking.pixel], parts)
+            image[asking.pixel, :3] = _sum_irradiance(frame.tracer(), asking, vpls, bits[asking.pixel], parts)
         io["irradiance"].upload(image.reshape(height, width, 4))
 
 
-def _irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, parts: int) -> Array:
+def _sum_irradiance(tracer: Tracer, seen: Surfaces, vpls: np.ndarray, bits: Ints, parts: int) -> Array:
     """Return irradiance (n, 3) of `seen` from those of `parts` shares of the VPLs that have a bit in `bits` (n, 2)."""
     geometry = tracer.scene.geometry
     scaled = ScaledVpls.from_vpls(tracer, read_vpls(vpls), read_limits(vpls))

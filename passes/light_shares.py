@@ -1,7 +1,7 @@
 """Light each pixel by its share of the VPLs: vpls, G-buffer, shadows -> irradiance, in sub-buffers.
 
-Pixels with the same share stand together (Segovia et al. 2006), so that each draw has one list of lights. The G-buffer
-is read with stride n, not copied.
+Pixels with the same share stand together in a sub-buffer (Segovia et al. 2006), so that each draw needs one list of
+VPLs. The G-buffer is read with stride n instead of being copied.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from deferred_ir.shadows.filter import VplFilter
 from deferred_ir.vpls.interleaving import SharesMeta, find_share_starts, find_sub_buffers
 
 
-class Interleaved(Pass):
-    """Irradiance from n^2 times a pixel's share of the VPLs."""
+class LightShares(Pass):
+    """Irradiance from each pixel's share of the VPLs, times n^2."""
 
     Params = VplFilter
     inputs: ClassVar[Mapping[str, Input]] = {
@@ -35,22 +35,22 @@ class Interleaved(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Irradiance before albedo, which the filter must not blur."""
+        """Return one texture of the frame's size. It holds irradiance: the filter must not blur albedo."""
         del inputs
         doc = "irradiance in sub-buffers; 0 on the background"
-        # With the defines of its filter: who lights what is missing in the sub-buffers filters alike.
+        # With the defines of the shadow filter: `gather` lights lonely pixels by the same one.
         return {"shares": Output(doc, Texture("rgba32f"), self.params.vpl_defines(), transient=True)}
 
     def depends(self) -> frozenset[str]:
-        """Positions come back from the depth."""
+        """The camera: positions are reconstructed from the depth."""
         return frozenset({"camera"})
 
     def unneeded(self, facts: Facts) -> str | None:
-        """Without VPLs there is no light to share."""
+        """Leave the pass out where there are no VPLs."""
         return None if facts[VPLS] else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """A draw for each share, or more where it crosses from block to block of the buffer."""
+        """Draw each share once for every block of the buffer that holds VPLs of it."""
         vpls, n = io["vpls"], io.meta("vpls", SharesMeta).n
         ctx, block = io.gpu.ctx, vpls.description.block
         program = io.program("light_shares.frag", defines=shader_variants.choose_for_pixels(frame, vpls.records))
@@ -59,7 +59,7 @@ class Interleaved(Pass):
         for share, rectangle in enumerate(find_sub_buffers(frame.size, n)):
             io.gpu.gl.Viewport(*rectangle)
             start, stop = starts[share : share + 2]
-            # An empty share is drawn as well: the filter counts its pixels.
+            # An empty share is drawn as well, so that its pixels are 0.
             for number in range(start // block, max(stop - 1, start) // block + 1):
                 vpls.bind(number)
                 first, end = max(start, number * block), min(stop, (number + 1) * block)
@@ -77,4 +77,4 @@ class Interleaved(Pass):
                 program.draw_fullscreen()
 
 
-PASS = Interleaved
+PASS = LightShares

@@ -1,4 +1,4 @@
-"""Give back by short rays what the clamp takes (Kollig and Keller 2004): vpls, G-buffer -> residual.
+"""Restore by short rays the light that the clamp takes (Kollig and Keller 2004): vpls, G-buffer -> residual.
 
 The G-buffer is read back, Embree traces on the CPU, and the residual goes up as a texture, to be filtered with the
 light of the VPLs that it completes.
@@ -45,28 +45,28 @@ class NearField(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """One texture of the frame's size."""
+        """Return one texture of the frame's size."""
         del inputs
         doc = "irradiance lost to the clamp; alpha: the pixel's weight, 0 where no ray was traced"
         return {"residual": Output(doc, Texture("rgba32f"), transient=True)}
 
     def state_facts(self, facts: Facts) -> Statements:
-        """State that the light which the clamp takes is added."""
+        """State that the light that the clamp takes is restored."""
         del facts
         return {CLAMP_RETURNED: True}
 
     def unneeded(self, facts: Facts) -> str | None:
-        """Without a clamp there is no residual, and without light none either."""
+        """Leave the pass out where nothing is clamped or the light is off."""
         if not facts[EMITS]:
             return "the spotlight emits nothing"
         return None if facts[CLAMPED] else "nothing is clamped: vpl.clamp or vpl.count is 0"
 
     def depends(self) -> frozenset[str]:
-        """Rays from what the camera sees, which the light hits."""
+        """What the camera sees, and how the light falls on it."""
         return frozenset({"camera", "light", "models", "seed"})
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Read back, trace, upload."""
+        """Read the G-buffer back, trace, upload."""
         vpls = io["vpls"].records
         if len(vpls) == 0:
             io.framebuffer.clear_color()

@@ -57,7 +57,7 @@ class Neighbours(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Bits for each pixel of the window, and a list of pixels as large as the frame."""
+        """Return bits for each pixel of the window, and a list with room for all pixels."""
         block = inputs["block"]
         assert isinstance(block, Buffer)
         window = Texture("rg32ui", layers=-(-block.parts // TAPS))
@@ -69,11 +69,11 @@ class Neighbours(Pass):
         }
 
     def depends(self) -> frozenset[str]:
-        """Positions follow from the depth and the camera; the seed shifts the window."""
+        """The camera, since positions are reconstructed from the depth; and the seed, which shifts the window."""
         return frozenset({"camera", "seed"})
 
     def unneeded(self, facts: Facts) -> str | None:
-        """Without VPLs there is no light to share."""
+        """Leave the pass out where there are no VPLs."""
         return None if facts[VPLS] else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
 
     def execute(self, frame: Frame, io: Io) -> None:

@@ -1,4 +1,4 @@
-"""Ask by shadow rays which lights each pixel sees: vpls, G-buffer -> masks, one bit a VPL of its share; spotlight.
+"""Find by shadow rays which lights each pixel sees: vpls, G-buffer -> masks, one bit a VPL of its share; spotlight.
 
 Interleaved, a pixel asks so few VPLs that exact rays can cost less than a map of the whole scene for each. The G-buffer
 is read back, Embree traces on the CPU, and the answers go up. The spotlight is asked, too: no light needs a map.
@@ -33,10 +33,13 @@ class Params:
     """Parameters of visibility by rays."""
 
     visibility: Literal["auto", "maps", "rays"] = param(
-        "auto", doc="Whether VPLs' shadows come from maps or from rays; auto: from what should take less time."
+        "auto", doc="Whether VPLs' shadows come from maps or from rays; auto: from whichever should take less time."
     )
     disc_samples: int = param(
-        16, lo=1, hi=64, doc="By rays: points of the spotlight's disc that a pixel asks, where it has a radius."
+        16,
+        lo=1,
+        hi=64,
+        doc="By rays: points of the spotlight's disc that a pixel traces rays to, where the spotlight has a radius.",
     )
 
 
@@ -51,7 +54,7 @@ class ShadowRays(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Masks have a layer for each 32 VPLs of a share."""
+        """Return masks, with a layer for each 32 VPLs of a share, and the spotlight's light."""
         vpls = inputs["vpls"]
         assert isinstance(vpls, Buffer)
         layers = -(-vpls.records // (vpls.parts * BITS))
@@ -63,7 +66,7 @@ class ShadowRays(Pass):
         }
 
     def unneeded(self, facts: Facts) -> str | None:
-        """Where maps are chosen, or cost less."""
+        """Leave the pass out where maps are chosen or should take less time."""
         if not facts[EMITS]:
             return "the spotlight emits nothing"
         if self.params.visibility == "maps":
@@ -75,11 +78,11 @@ class ShadowRays(Pass):
         return f"maps should take less time: {maps:.2g} ms for each VPL, rays {rays:.2g} ms"
 
     def depends(self) -> frozenset[str]:
-        """Rays from what the camera sees to the lights."""
+        """The rays' ends: what the camera sees, and the light; and what lies between."""
         return frozenset({"camera", "light", "models", "seed"})
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Read back, trace, upload."""
+        """Read the G-buffer back, trace, upload."""
         vpls, parts = io["vpls"].records, io["vpls"].description.parts
         tracer, seen = frame.tracer(), frame.read_surfaces(io["depth"], io["normals"])
         n = round(parts**0.5)

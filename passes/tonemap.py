@@ -1,4 +1,4 @@
-"""Radiance to display pixels: exposure, tone curve, sRGB. The only place that does so.
+"""Convert radiance to display pixels: exposure, tone curve, sRGB. No other file does so.
 
 Curves: Khronos PBR Neutral (specification of 2024), Reinhard et al. 2002, ACES as fitted by Narkowicz 2015.
 """
@@ -40,22 +40,22 @@ class Tonemap(FullscreenPass):
     vertex = "tonemap/exposure.vert"
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Display pixels."""
+        """Return one texture of the frame's size."""
         del inputs
         return {"color": Output("sRGB-encoded display colour", Texture("rgba8"))}
 
     def depends(self) -> frozenset[str]:
-        """Nothing else."""
+        """Nothing of the frame."""
         return frozenset()
 
     def defines(self, frame: Frame) -> Mapping[str, int | float]:
-        """The operator and who exposes: no pixel has code for the others."""
+        """Choose the operator and the kind of exposure at compile time, unless the graph keeps all variants."""
         given = self.uniforms()
         chosen = {"OPERATOR": given["operator_number"], "AUTOMATIC": int(given["automatic"])}
         return {} if frame.keep_all else chosen
 
     def uniforms(self) -> Mapping[str, Any]:
-        """The operator as its number."""
+        """Return the operator's number, and the exposure as a factor."""
         auto = self.params.exposure == "auto"
         return {
             "operator_number": get_args(Operator).index(self.params.operator),

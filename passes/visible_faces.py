@@ -10,11 +10,11 @@ from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Output, Texture
 
 
-class Prepass(Pass):
+class VisibleFaces(Pass):
     """Depth and face number of the nearest surface."""
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Two targets of the frame's size."""
+        """Return two textures of the frame's size."""
         del inputs
         return {
             "primitives": Output("number of the face, plus one; 0 is the background", Texture("r32ui")),
@@ -22,7 +22,7 @@ class Prepass(Pass):
         }
 
     def depends(self) -> frozenset[str]:
-        """What the camera sees."""
+        """The camera and the models."""
         return frozenset({"camera", "models"})
 
     def execute(self, frame: Frame, io: Io) -> None:
@@ -32,8 +32,8 @@ class Prepass(Pass):
         ctx = io.gpu.ctx
         ctx.enable(ctx.DEPTH_TEST)
         ctx.depth_func = ">"
-        # The same vertex shader as the passes that test for equality: all its outputs, though only positions are read.
+        # The vertex shader of the passes that test depth for equality, with all its outputs, of which one is read.
         frame.buffers.draw(io.program("visible_faces.frag", "scene.vert", defines=frame.buffers.defines))
 
 
-PASS = Prepass
+PASS = VisibleFaces

@@ -1,5 +1,5 @@
-// The mean irradiance of the pixels that passes/neighbours.py has found to lie on the pixel's own surface. Lonely pixels
-// get the part of the shares that count, and the rest later on.
+// The mean irradiance of the pixels that lie on the pixel's own surface (passes/neighbours.py). Lonely pixels get the
+// light of the shares that they have; that of missing shares is added later.
 #include "lib/shares/places.glsl"
 #include "lib/shares/window.glsl"
 
@@ -46,7 +46,7 @@ void main() {
         }
     }
 #if HAS_NEAR_FIELD
-    // It is no share's: neighbours have parts of it whichever they are.
+    // The near field belongs to no share: any neighbours estimate it, and what they have of it in `sum` is replaced.
     vec4 given = vec4(0.0);
     groups = lonely ? GROUPS : 0;
     for (int g = 0; g < groups; ++g) {

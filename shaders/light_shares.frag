@@ -1,4 +1,4 @@
-// Irradiance from VPLs first to end of a block, on the pixels of one share, in its sub-buffer.
+// Irradiance from the VPLs `first` to `end` of a block on the pixels of one share, in its sub-buffer.
 #include "lib/surface/pixel.glsl"
 #include "lib/lights/vpl.glsl"
 #include "lib/shares/places.glsl"

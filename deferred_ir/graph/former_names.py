@@ -41,11 +41,13 @@ def rename(
     for node, name in moved:
         former = (f"{node}.{name}", f"{kinds.get(node, node)}.{name}")
         value = values[node, name]
-        for home in next((homes[key] for key in former if key in homes), []):
+        found = next((homes[key] for key in former if key in homes), [])
+        for home in found:
             result.pop((node, name), None)
             if result.setdefault(home, value) != value:
                 faults.append(f"{node}.{name}: is {'.'.join(home)} by now, which has another value; remove one of them")
-            _note(f"{node}.{name}", ".".join(home))
+        if found:
+            _note(f"{node}.{name}", " and ".join(".".join(home) for home in found))
     return result
 
 

@@ -1,4 +1,4 @@
-// Adds the light of a block's VPLs in the shares that a lonely pixel misses.
+// Adds to each lonely pixel the light of its missing shares' VPLs in one block.
 #include "lib/surface/pixel.glsl"
 #include "lib/lights/vpl.glsl"
 #include "lib/shares/lonely.glsl"
@@ -34,7 +34,7 @@ void main() {
     const int shares = INTERLEAVE * INTERLEAVE;
     for (int share = 0; share < shares; ++share) {
         bool wanted = ((bits[share >> 5] >> (share & 31)) & 1u) == 1u;
-        int end = wanted ? ranges[share].y : 0;  // nothing is looped over where no pixel wants it
+        int end = wanted ? ranges[share].y : 0;  // the loop is empty where no pixel of the group misses the share
         for (int i = ranges[share].x; i < end; ++i)
             sum += vpl_irradiance(vpls[i], p.position, p.normal, p.shading_normal) * visibility(vpls[i], p);
     }

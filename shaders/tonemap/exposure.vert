@@ -24,7 +24,7 @@ float automatic_exposure() {
             sum += bright;
             lit += float(bright > 0.0);
         }
-    // Nothing lit: nothing to expose for. Of hardly anything the quotient overflows, and infinity times 0 is no number.
+    // With next to no light the quotient overflows, and infinity times 0 is NaN; with none any exposure will do.
     return sum > 0.0 ? min(MIDDLE_GREY * lit / sum, 1e37) : 1.0;
 }
 

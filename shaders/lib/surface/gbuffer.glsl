@@ -24,7 +24,7 @@ vec3 from_octahedral(vec2 code) {
 #define SMOOTH 1
 #endif
 
-// What a texel of `normals` holds.
+// Decodes a texel of `normals`.
 void decode_normals(vec4 code, out vec3 shading, out vec3 geometric) {
     geometric = from_octahedral(code.zw);
 #if SMOOTH

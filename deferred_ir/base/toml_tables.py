@@ -182,7 +182,7 @@ class Table:
         return result
 
     def vec3s(self, key: str, times: tuple[float, ...] | None) -> tuple[Vec3, ...] | None:
-        """Return an array of triples, one for each of `times`."""
+        """Read the array of triples under `key`, one for each of `times`; None if it is missing or faulty."""
         rows = self.vectors(key, 3, times)
         return None if rows is None else tuple((x, y, z) for x, y, z in rows)
 

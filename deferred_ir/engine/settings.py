@@ -82,4 +82,6 @@ def parse_settings(pairs: Sequence[str]) -> dict[str, Any]:
 def list_notes(scene: Scene) -> Iterator[str]:
     """Yield what the files say but the renderer ignores, then what was chosen because the files leave it out."""
     yield from scene.notes
-    yield from (f"no {what} in the file: {how.get('why', 'one was chosen')}" for what, how in scene.chosen.items())
+    yield from (
+        f"no {what} in the file, one was placed: {how.get('why', 'see RUN.json')}" for what, how in scene.chosen.items()
+    )

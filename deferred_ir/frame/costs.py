@@ -1,4 +1,4 @@
-"""A rough model of what a VPL's shadows cost, by a map or by rays: plans are made before a frame is measured."""
+"""A rough model of what a VPL's shadows cost, by map or by rays; plans are made before any frame is measured."""
 
 from __future__ import annotations
 

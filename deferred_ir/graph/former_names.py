@@ -45,7 +45,7 @@ def rename(
         for home in found:
             result.pop((node, name), None)
             if result.setdefault(home, value) != value:
-                faults.append(f"{node}.{name}: is {'.'.join(home)} by now, which has another value; remove one of them")
+                faults.append(f"{node}.{name}: has moved to {'.'.join(home)}, which has another value; remove one")
         if found:
             _note(f"{node}.{name}", " and ".join(".".join(home) for home in found))
     return result

@@ -31,7 +31,8 @@ _known: WeakKeyDictionary[Geometry, Levels] = WeakKeyDictionary()
 class Levels:
     """The levels of detail of a scene.
 
-    faces: (F, 3), of all levels, on the scene's vertices. level, chunk: (F,), of each face. deviations: (L,), of the
+    faces: (F, 3), of all levels, on the scene's vertices. level, chunk: (F,), of each face; a chunk is a group of
+    neighbouring triangles that has all levels. deviations: (L,), of the
     levels, ascending from 0, in world units. boxes: (2, C, 3), corners of the chunks, in moving models' own
     coordinates where they belong to one. No chunk has triangles of two models that move independently.
     """

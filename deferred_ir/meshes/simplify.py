@@ -211,7 +211,7 @@ class _Mesh:
         return normal, open_ > 0, self.waiting & ~crowded & ~folded & (inner | edge)
 
     def _estimate_costs(self, survey: _Survey, u: Ints, v: Ints) -> Array:
-        """Return how far v lies off the planes at u, at most; inf where a triangle would fold over."""
+        """Return, for moves of vertices u to v, v's distance from the planes of u's triangles; inf where one folds."""
         cost = np.zeros(len(u))
         if not len(u):
             return cost

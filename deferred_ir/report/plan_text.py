@@ -16,7 +16,7 @@ def summary(plan: Plan, scene: Scene | None = None) -> str:
     for number, step in enumerate(plan.steps):
         lines.append(f"{number + 1}. {step.name}" + (f"  ({kind})" if (kind := _kind(step.work, step.name)) else ""))
         for port, source in step.sources.items():
-            lines.append(f"     reads  {port}: " + (".".join(source) if source else "nothing, and can do without"))
+            lines.append(f"     reads  {port}: " + (".".join(source) if source else "not connected (optional)"))
         for port, output in step.outputs.items():
             last = plan.lifetimes[step.name, port][1]
             until = f"until {plan.steps[last].name}" if last > number else "read by nobody"

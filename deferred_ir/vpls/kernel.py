@@ -1,4 +1,4 @@
-"""The light that a VPL brings to a surface, without shadows: the formulas of shaders/lib/lights/light.glsl on the CPU.
+"""The light that a VPL brings to a surface, without shadows: the formulas of shaders/lib/lights/vpl.glsl on the CPU.
 
 A VPL of emission E_i brings irradiance E_i cos(theta_y) cos(theta_x) / max(d^2, c^2): to surfaces inside its cone only,
 and never through the back of a face. Arrays of vectors have their coordinates along the first axis here, (3, ...), so

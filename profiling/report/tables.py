@@ -63,7 +63,7 @@ def peer_row(point: PeerPoint) -> dict[str, Any]:
 
 
 def pass_rows(points: Iterable[Point]) -> list[dict[str, Any]]:
-    """Return quartiles over frames and seeds: of each pass, of a frame's sum of passes, and of its wall time."""
+    """Return quartiles over frames and seeds of the times of each pass, of all passes of a frame, and of the frame."""
     times: dict[tuple[str, int], dict[str, list[tuple[float, float]]]] = {}
     walls: dict[tuple[str, int], list[float]] = {}
     for point in points:

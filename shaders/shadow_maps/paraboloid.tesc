@@ -37,7 +37,7 @@ bool before(vec3 a, vec3 b) {
     return a.x < b.x || a.x == b.x && (a.y < b.y || a.y == b.y && a.z < b.z);
 }
 
-// Normal of the plane through the light, a and b: that of b and a is its opposite to the last bit, so neighbours that share
+// Normal of the plane through the light, a and b. Swapping a and b flips its sign and no other bit, so triangles that share
 // an edge leave no gap.
 vec3 across(vec3 a, vec3 b) {
     return before(b, a) ? -unit(cross(b, a)) : unit(cross(a, b));

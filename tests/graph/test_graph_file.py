@@ -23,6 +23,9 @@ from deferred_ir.graph.graph import Graph
 from deferred_ir.graph.params import param, specs
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Input, Output, Texture
+from deferred_ir.profiling.checks import visibility
+from deferred_ir.profiling.limits.passes import LIMITS
+from deferred_ir.profiling.studies import tessellation
 
 SMALL = """
 [outputs]
@@ -365,10 +368,10 @@ def test_what_extends_a_file_with_former_names_wins_over_them(tmp_path):
 
 def test_values_under_a_former_and_the_present_name_must_agree(tmp_path):
     told = fault(tmp_path, SMALL + MOVED, {"end.size": 3, "other.width": 4})
-    assert "set end.size: is other.width by now, which has another value; remove one of them" in told
+    assert "set end.size: has moved to other.width, which has another value; remove one" in told
     assert "middle" not in told
     assert widths(load_graph(tmp_path / "own.toml", {"end.size": 3, "other.width": 3}, OWN)) == [3.0, 3.0]
-    assert "end.size: is other.width by now" in fault(tmp_path, SMALL + "size = 2\n" + MOVED)
+    assert "end.size: has moved to other.width" in fault(tmp_path, SMALL + "size = 2\n" + MOVED)
 
 
 def test_a_value_under_a_former_name_is_checked(tmp_path):
@@ -430,3 +433,13 @@ def test_any_file_gives_a_graph_or_one_line(tmp_path, table, chosen):
     else:
         message = "compiled"
     assert len(message.splitlines()) == 1
+
+
+FOLDERS = [Path(__file__).resolve().parents[2] / folder for folder in ("passes", "profiling")]
+GRAPH_FILES = {path.stem: path for folder in FOLDERS for path in sorted(folder.rglob("*.toml"))}
+
+
+@pytest.mark.parametrize("name", GRAPH_FILES)
+def test_every_graph_file_of_the_package_compiles(name):
+    graph = load_graph(GRAPH_FILES[name], passes={**visibility.PASSES, **LIMITS, **tessellation.PASSES})
+    assert compile(graph, list(graph.outputs)).steps

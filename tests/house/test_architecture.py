@@ -13,7 +13,7 @@ ROOMS = (
     *("passes", "engine", "report", "truth", "viewer", "profiling", "cli"),
 )
 MOST_FILES = 12
-LONGEST = 350
+LONGEST = 300
 SHADERS = {".glsl", ".vert", ".tesc", ".tese", ".geom", ".frag"}
 THIRD_PARTIES = {
     "moderngl": ("gl",),

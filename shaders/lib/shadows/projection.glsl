@@ -97,8 +97,8 @@ vec3 nearest_of_four(Receiver r, vec2 texel, float depth, vec2 slope) {
 }
 
 // The plane of the receiver's face `offset` texels away: x, y the slope there, z the depth. In a planar map 1/w is linear
-// on a plane. In a paraboloid map coordinates are tangents of half the angle, and 1/distance is a quadratic in them over
-// another: `divisor` is (1 + |p|^2) there over that here, p the coordinates, so it is above 0.
+// on a plane. In a paraboloid map the coordinates p are tangents of half the angle, and 1/distance on a plane is a quotient
+// of two quadratics in p: `divisor` is (1 + |p|^2) at the offset over (1 + |p|^2) here, so it is above 0.
 vec3 receiver_plane(Receiver r, vec2 offset) {
     float square = dot(offset, offset), divisor = 1.0 + dot(r.bend.xy, offset) + r.bend.z * square;
     float rise = (dot(r.slope, offset) - r.bend.w * square) / divisor;

@@ -19,8 +19,8 @@ vec2 map_texel(View view, vec3 v) {
     return (v.xy / (divisor * view.tan_half) * 0.5 + 0.5) * view.size;
 }
 
-// What the map holds `offset` texels away, if it lies between receiver and a disc of `radius`: the receiver's distance
-// over its own, from the plane of the disc; else 0.
+// If the surface in the map `offset` texels away lies between the receiver and a disc of `radius`: the receiver's distance
+// from the plane of the disc over that surface's. Else 0.
 float blocker(DEPTHS map, View view, Receiver r, vec3 v, vec2 offset, float radius) {
     vec2 texel = floor(clamp(r.texel + offset, 0.5, view.size - 0.5)) + 0.5;
     float depth = depth_at(map, view.rectangle, ivec2(texel));

@@ -57,7 +57,7 @@ class ShadowRays(Pass):
         """Return masks, with a layer for each 32 VPLs of a share, and the spotlight's light."""
         vpls = inputs["vpls"]
         assert isinstance(vpls, Buffer)
-        layers = -(-vpls.records // (vpls.parts * BITS))
+        layers = max(-(-vpls.records // (vpls.parts * BITS)), 1)
         doc = "bit b of layer w: whether the pixel sees VPL 32 w + b of its share; in sub-buffers"
         direct = "irradiance from the spotlight over its emission, shadows included; 0 on the background"
         return {

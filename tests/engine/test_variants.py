@@ -80,7 +80,7 @@ def test_a_scene_compiles_only_what_no_scene_before_it_needed(renderer):
         one.render(scene, **options)
         return library.compiled - before
 
-    assert compiled(room()) == 4  # G-buffer, maps, lighting, tone map
+    assert compiled(room()) == 5  # G-buffer, maps of direct lights and of VPLs, lighting, tone map
     assert compiled(room(), seed=5, time=1.0) == 0
     assert compiled(smooth_scene()) == 2  # G-buffer, lighting
     assert compiled(partly_textured()) == 1  # G-buffer
@@ -93,4 +93,4 @@ def test_without_a_clamp_or_shading_normals_shaders_do_not_name_them(renderer):
     one = renderer(SIZE, "deferred", set={**FEW, "vpl.clamp": 0.0})
     one.render(room())
     defines = [dict(key[2]) for key in one.executor.library._programs if key[0] == ("lighting.frag",)]
-    assert [(d["CLAMPED"], d["SMOOTH"], d["DISC"], d["SPOT_PARABOLOID"]) for d in defines] == [(0, 0, 0, 0)]
+    assert [(d["CLAMPED"], d["SMOOTH"], d["DISC"], d["VIEWS_PARABOLOID"]) for d in defines] == [(0, 0, 0, 0)]

@@ -153,7 +153,7 @@ def test_a_light_does_not_see_the_surface_it_is_on(renderer, tmp_path, edge, pre
         prepare(one)
     one.render(build(plane()))
     with one.gpu.ctx:
-        assert one.executor.resource(("shadow_maps", "atlas")).read().max() == 0
+        assert one.executor.resource(("shadow_maps", "atlas")).read()[1:].max() == 0
 
 
 def mismatch(**settings):

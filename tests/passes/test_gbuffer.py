@@ -57,7 +57,7 @@ def first_hits(scene):
 
 def unproject(scene, depth):
     """World positions (H, W, 3) by the formula of lib/camera/frame.glsl, from the block that shaders get."""
-    block = np.frombuffer(Frame(SIZE, scene, None, None).block(), FRAME)[0]
+    block = np.frombuffer(Frame(SIZE, scene, None, None).pack(), FRAME)[0]
     height, width = depth.shape[:2]
     x = (np.arange(width) + 0.5) / width * 2 - 1
     y = 1 - (np.arange(height) + 0.5) / height * 2

@@ -26,7 +26,7 @@ def shown(make, scene, lights, *, size=SIZE, seed=0, **settings):
     one = make(size, visibility.GRAPH, set=given, passes=visibility.PASSES)
     plan = one.plan(scene, outputs=[lights])
     one.draw(scene, plan, seed=seed)
-    pairs = visibility.judged(one, scene, lights)
+    pairs = visibility.trace_pairs(one, scene, lights)
     return pairs.shown, pairs.lit
 
 

@@ -51,7 +51,7 @@ def judged(renderer, projection):
         one = renderer(SIZE, visibility.GRAPH, set=chosen, passes=visibility.PASSES)
         plan = one.plan(scene, outputs=[lights])
         one.draw(scene, plan, seed=1)
-        pairs = visibility.judged(one, scene, lights)
+        pairs = visibility.trace_pairs(one, scene, lights)
         assert len(pairs.light) > 300
         assert np.isfinite(pairs.shown).all()
         return pairs

@@ -28,6 +28,7 @@ class ProgressBar:
         """Add to the work done."""
         if self._bar is not None:
             self._bar.update(amount)
+            self._show_end()
 
     def show(self, done: int, total: int) -> None:
         """Set the work done and all the work: a `Progress`. Less done than before starts the bar again."""
@@ -37,6 +38,12 @@ class ProgressBar:
             self._bar.reset()
         self._bar.total = total
         self._bar.update(done - self._bar.n)
+        self._show_end()
+
+    def _show_end(self) -> None:
+        """Draw the bar when the work is done, however soon after the last time."""
+        if self._bar is not None and self._bar.total and self._bar.n >= self._bar.total:
+            self._bar.refresh()
 
     def print(self, text: str, file: TextIO | None = None) -> None:
         """Print a line above the bar, on standard output by default."""

@@ -20,7 +20,7 @@ LIGHTS_DROPPED = Figure(
 )
 
 MARGIN = 1e-5
-"""Of the largest distances that pixels' positions are made of: they come back from a depth, and 32 bits err by 1e-7."""
+"""Tolerance, as a fraction of the largest distance in a pixel's position: 32-bit depths err by 1e-7."""
 AXES = np.dtype([(name, "f4", 3) for name in ("position", "x_axis", "y_axis", "z_axis")])
 STRIDE = 16
 """One cluster is enough to keep a light, and nearly all find theirs among every 16th."""

@@ -123,7 +123,7 @@ class Geometry:
 
     @cached_property
     def groups(self) -> Ints:
-        """Which model moves each face, int (F,): 0 for none, i + 1 for moving model i."""
+        """Number of the moving model that each face belongs to, int (F,): 0 for none, i + 1 for moving model i."""
         return find_groups(self.faces, [model.vertices for model in self.moving])
 
     @cached_property
@@ -241,7 +241,7 @@ class PosedGeometry(Geometry):
 
     @cached_property
     def groups(self) -> Ints:
-        """Which model moves each face, as at rest."""
+        """Number of the moving model that each face belongs to, as at rest."""
         return self._rest.groups
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Which shadow maps of an atlas can be used again: those drawn for a light whose version is still the same."""
+"""Reuse of the shadow maps in an atlas: a map is valid while its light keeps its version."""
 
 from __future__ import annotations
 

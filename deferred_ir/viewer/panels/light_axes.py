@@ -13,7 +13,7 @@ from deferred_ir.viewer.canvas import Area
 from deferred_ir.viewer.session import Session
 
 LENGTH = 0.02
-"""Of a VPL's axis, diagonals of the scene; the spotlight's are three times as long."""
+"""Length of a VPL's axes in diagonals of the scene; the spotlight's are three times as long."""
 COLORS = ((1.0, 0.25, 0.2), (0.3, 0.9, 0.3), (0.3, 0.5, 1.0))
 DIM = 0.25
 

@@ -22,7 +22,7 @@ from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Texture
 
 Key = tuple[str, str, Description, tuple[int, int] | None, type[Pass]]
-"""Of a resource: pass, port, description, the frame's size where it matters, and the pass's type, for its state."""
+"""What tells one resource from another: pass, port, description, frame size where it matters, and pass type."""
 
 
 class Allocation:

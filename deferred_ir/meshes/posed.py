@@ -23,7 +23,7 @@ class MapMesh:
 
     @cached_property
     def groups(self) -> Ints:
-        """Which model moves each face, int (F,): 0 for none, i + 1 for moving model i."""
+        """Model that moves each face, int (F,): 0 for none, i + 1 for moving model i."""
         return find_groups(self.faces, self.moving)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Which kind of image a file's name means, and whether that can be written. Imports no format that is not asked for."""
+"""Find the kind of image a file name means, and whether it can be written. Imports no format that is not asked for."""
 
 from __future__ import annotations
 

@@ -62,7 +62,7 @@ void main() {
 #if HAS_SPOTLIGHT
     if (direct > 0) irradiance = lights[0].emission * texelFetch(spotlight, pixel, 0).r;
 #else
-    for (int i = 0; i < direct; ++i)
+    for (int i = 0; i < min(direct, LIGHTS_PER_BLOCK); ++i)  // of a known bound: a loop of one is none
         irradiance += light_irradiance(lights[i], p.position, p.normal, p.shading_normal) * visibility(lights[i], p);
 #endif
 #if HAS_INDIRECT  // with the near field in it

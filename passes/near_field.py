@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.facts import EMITS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
@@ -22,6 +23,9 @@ from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.rays.pixel_surfaces import PixelJob
 from deferred_ir.vpls.clamp_residual import trace_residual
 from deferred_ir.vpls.interleaving import SharesMeta
+
+BLOCK = 4
+"""Edge of the blocks of samples that the rays' pattern shares: about the reach of the filter that follows."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +44,15 @@ class NearField(Pass):
     inputs: ClassVar[Mapping[str, Input]] = {
         "vpls": Input("the VPLs: their clamp and cone", format="vpl"),
         "dealt": Input("the VPLs as dealt to pixels, whose blocks the rays' pattern shares", "share", optional=True),
-        "depth": Input("reversed depth", format="depth32f"),
-        "normals": Input("shading and geometric normal", format="rgba16"),
+        "depth": Input("reversed depth; or else `positions`", format="depth32f", optional=True),
+        "positions": Input("where samples are, if these ask and not all pixels", format="rgba32f", optional=True),
+        "normals": Input("shading and geometric normal, of pixels or of samples", format="rgba16"),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Return one texture of the frame's size."""
-        del inputs
+        """Return one texture of the frame's size. Raises GraphError unless pixels or samples ask, one of them."""
+        if (inputs["depth"] is None) == (inputs["positions"] is None):
+            raise GraphError("connect either depth, for all pixels, or positions, for samples")
         doc = "irradiance lost to the clamp; alpha: the pixel's weight, 0 where no ray was traced"
         return {"residual": Output(doc, Texture("rgba32f"), transient=True)}
 
@@ -71,8 +77,11 @@ class NearField(Pass):
         if len(vpls) == 0:
             io.framebuffer.clear_color()
             return
-        block = io.meta("dealt", SharesMeta).n if io["dealt"] else 1
-        seen = frame.read_surfaces(io["depth"], io["normals"])
+        block = io.meta("dealt", SharesMeta).n if io["dealt"] else BLOCK if io["positions"] else 1
+        if io["positions"]:
+            seen = frame.read_samples(io["positions"], io["normals"])
+        else:
+            seen = frame.read_surfaces(io["depth"], io["normals"])
         job = PixelJob(frame.tracer(), seen, frame.size, block, frame.seed)
         bounces = io.meta("vpls", VplsMeta).bounces
         image = trace_residual(job, read_limits(vpls), samples=self.params.samples, bounces=bounces)

@@ -11,7 +11,7 @@ import numpy as np
 from deferred_ir.base.arrays import Vec3
 from deferred_ir.frame.scene_buffers import SceneBuffers
 from deferred_ir.gl.textures import GpuTexture
-from deferred_ir.rays.pixel_surfaces import Surfaces, decode_gbuffer
+from deferred_ir.rays.pixel_surfaces import Surfaces, decode_gbuffer, decode_samples
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
 
@@ -80,6 +80,17 @@ class Frame:
             self._surfaces[key] = decode_gbuffer(
                 self.scene.camera, self.near, depth.read()[..., 0], normals.read(), smooth=smooth
             )
+        return self._surfaces[key]
+
+    def read_samples(self, positions: GpuTexture, normals: GpuTexture) -> Surfaces:
+        """Return the surfaces of samples, numbered by their texels, read back once, after both textures were written.
+
+        positions: with the depth of view, 0 where nothing was seen. normals: as in the G-buffer.
+        """
+        key = positions, normals
+        if key not in self._surfaces:
+            smooth = self.scene.geometry.normals is not None
+            self._surfaces[key] = decode_samples(positions.read(), normals.read(), smooth=smooth)
         return self._surfaces[key]
 
     def pack(self) -> bytes:

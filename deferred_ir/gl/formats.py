@@ -30,6 +30,7 @@ FORMATS = {
     "rgba16": Format(raw.RGBA16, raw.RGBA, raw.FLOAT, 4, "f4", 8),
     "rgba8": Format(raw.RGBA8, raw.RGBA, raw.UNSIGNED_BYTE, 4, "u1", 4),
     "r32f": Format(raw.R32F, raw.RED, raw.FLOAT, 1, "f4", 4),
+    "rgba32ui": Format(raw.RGBA32UI, raw.RGBA_INTEGER, raw.UNSIGNED_INT, 4, "u4", 16),
     "rg32ui": Format(raw.RG32UI, raw.RG_INTEGER, raw.UNSIGNED_INT, 2, "u4", 8),
     "r32ui": Format(raw.R32UI, raw.RED_INTEGER, raw.UNSIGNED_INT, 1, "u4", 4),
     "depth32f": Format(raw.DEPTH_COMPONENT32F, raw.DEPTH_COMPONENT, raw.FLOAT, 1, "f4", 4),

@@ -68,12 +68,29 @@ def decode_gbuffer(camera: Camera, near: float, depth: Array, normals: Array, *,
     return Surfaces(pixel, position, normal, _from_octahedral(code[:, :2]) if smooth else normal)
 
 
+def decode_samples(positions: Array, normals: Array, *, smooth: bool = True) -> Surfaces:
+    """Decode surfaces that are stored with their position and depth of view (H, W, 4), float32, 0 where there is none.
+
+    normals: octahedral, (H, W, 4). smooth: as for `decode_gbuffer`.
+    """
+    at = positions.reshape(-1, 4)
+    pixel = np.flatnonzero(at[:, 3] > 0)
+    code = normals.reshape(-1, 4).take(pixel, axis=0)
+    normal = _from_octahedral(code[:, 2:])
+    position = at.take(pixel, axis=0)[:, :3]
+    return Surfaces(pixel, position, normal, _from_octahedral(code[:, :2]) if smooth else normal)
+
+
 def _from_octahedral(code: Array) -> Array:
     """Decode unit vectors (n, 3) from codes (n, 2) in [0, 1] (Cigolle et al. 2014), as gbuffer.glsl does."""
+    # By columns: along rows of two and three, NumPy is seven times slower.
+    x, y = (code[:, i] * np.float32(2) - np.float32(1) for i in range(2))
+    z = np.float32(1) - (np.abs(x) + np.abs(y))
+    fold = np.maximum(-z, 0)
+    x -= np.copysign(fold, x)
+    y -= np.copysign(fold, y)
+    length = np.sqrt(x * x + y * y + z * z)
     vectors = np.empty((len(code), 3), np.float32)
-    plane, z = vectors[:, :2], vectors[:, 2]
-    np.subtract(code * np.float32(2), np.float32(1), out=plane)
-    np.subtract(1, np.abs(plane).sum(axis=1), out=z)
-    plane -= np.copysign(np.maximum(-z, 0)[:, None], plane)
-    vectors /= np.sqrt(np.einsum("ij,ij->i", vectors, vectors))[:, None]
+    for i, column in enumerate((x, y, z)):
+        np.divide(column, length, out=vectors[:, i])
     return vectors

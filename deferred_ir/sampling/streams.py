@@ -49,6 +49,21 @@ def resampling_pattern(seed: int) -> int:
     return seed + 65537
 
 
+def sample_grid(seed: int) -> Stream:
+    """Return the stream that places the grid of pixels that ask for indirect light."""
+    return np.random.default_rng([seed, 0, 2])
+
+
+def pool_groups(seed: int) -> Stream:
+    """Return the stream that chooses which VPL of the pool stands for each group."""
+    return np.random.default_rng([seed, 1, 2])
+
+
+def pool_lists(seed: int) -> Stream:
+    """Return the stream that draws the lists of VPLs of an image's tiles."""
+    return np.random.default_rng([seed, 2, 2])
+
+
 def residual_blocks(seed: int) -> Stream:
     """Return the stream that deals the rays of the clamping residual to the pixels of a block."""
     return np.random.default_rng(seed)

@@ -14,7 +14,11 @@ layout(std140, binding = LIGHTS_BINDING) uniform Lights { DirectLight lights[LIG
 
 #include "lib/lights/spot.glsl"
 
-// The only place that tells kinds of lights apart.
+// The only place that tells kinds of lights apart: irradiance over emission.
+float light_strength(DirectLight light, vec3 position, vec3 normal, vec3 shading_normal) {
+    return spot_strength(light, position, normal, shading_normal);
+}
+
 vec3 light_irradiance(DirectLight light, vec3 position, vec3 normal, vec3 shading_normal) {
-    return spot_irradiance(light, position, normal, shading_normal);
+    return light.emission * light_strength(light, position, normal, shading_normal);
 }

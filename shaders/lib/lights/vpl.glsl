@@ -17,22 +17,10 @@ struct Vpl {
 
 layout(std140, binding = VPLS_BINDING) uniform Vpls { Vpl vpls[VPLS_PER_BLOCK]; };
 
-#ifndef CLAMPED  // 0: no VPL's clamp_squared is above 0
-#define CLAMPED 1
-#endif
+#include "lib/lights/vpl_kernel.glsl"
 
-// I(w) = E_i cos(theta_y) inside a round cone, dark outside. No root: this is the innermost loop.
+// I(w) = E_i cos(theta_y) inside a round cone, dark outside.
 vec3 vpl_irradiance(Vpl vpl, vec3 position, vec3 normal, vec3 shading_normal) {
     vec3 from = position - vpl.position;
-    float square = dot(from, from);
-    float leaving = max(dot(vpl.z_axis, from), 0.0), edge = 1.0 - vpl.one_minus_cos;
-    float inside = step(edge * edge * square, leaving * leaving);
-    float cosines = leaving * receiving(-from, normal, shading_normal);
-#if CLAMPED
-    float held = max(square, vpl.clamp_squared);
-#else
-    float held = square;
-#endif
-    // The cosines bring a distance each. Two divisions: the fourth power of a small distance would vanish.
-    return vpl.emission * (inside * cosines / max(square, TINY) / max(held, TINY));
+    return vpl.emission * vpl_kernel(from, vpl.z_axis, normal, shading_normal, 1.0 - vpl.one_minus_cos, vpl.clamp_squared);
 }

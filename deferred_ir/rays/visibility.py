@@ -1,0 +1,44 @@
+"""Which points of a few each surface sees, by shadow rays, in few passes over arrays that fit a core's cache."""
+
+from __future__ import annotations
+
+from contextlib import closing
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.base.parallel import run_in_order
+from deferred_ir.rays.pixel_surfaces import Surfaces
+from deferred_ir.rays.tracer import Tracer
+
+SURFACES = 1 << 13
+"""Surfaces of a task."""
+
+
+def find_seen(
+    tracer: Tracer, at: Surfaces, places: Array, chosen: Ints, nobody: int, *, threads: int | None = None
+) -> tuple[Ints, int]:
+    """Return a bit for each point that a surface sees, uint8 (n,), and the number of rays.
+
+    at: n surfaces. places: float32 (m, 3), points off their surfaces, in world units. chosen: (n, k), k up to 8, which
+    of them each surface asks; `nobody` asks for none. Results do not depend on the number of `threads`.
+    """
+    tasks = [slice(start, start + SURFACES) for start in range(0, len(chosen), SURFACES)]
+
+    def work(rows: slice) -> tuple[Ints, int]:
+        asked = chosen[rows] != nobody
+        number = np.flatnonzero(asked)
+        origins = tracer.lift(at.position[rows], at.normal[rows]).take(number // chosen.shape[1], axis=0)
+        targets = places.take(chosen[rows].reshape(-1)[number], axis=0)
+        seen = np.zeros(asked.shape, bool)
+        seen.reshape(-1)[number] = ~tracer.occluded(origins, targets)
+        bits: Ints = np.packbits(seen, axis=1, bitorder="little")[:, 0]
+        return bits, len(number)
+
+    parts: list[Ints] = [np.zeros(0, np.uint8)]
+    count = 0
+    with closing(run_in_order(work, tasks, threads)) as results:
+        for bits, rays in results:
+            parts.append(bits)
+            count += rays
+    return np.concatenate(parts), count

@@ -1,0 +1,113 @@
+"""Choose the pixels that ask for indirect light: G-buffer -> the samples' surfaces, and how pixels blend them.
+
+Samples are a grid of every second pixel, say, in both directions. A pixel that lies on the surface of no sample around
+it becomes a sample of its own, so that no light crosses an edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import cos, radians
+from typing import ClassVar
+
+import numpy as np
+
+from deferred_ir.base.arrays import Ints
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_params import VPLS
+from deferred_ir.graph.facts import Facts
+from deferred_ir.graph.figures import Figure
+from deferred_ir.graph.params import param
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.pool.layout import LONELY, Layout
+from deferred_ir.pool.samples import describe_layout, draw_samples, write_layout
+
+SAMPLES = Figure("samples", "Pixels that ask for indirect light.", ("samples",))
+
+
+@dataclass(frozen=True)
+class Params:
+    """Parameters of the choice of samples."""
+
+    scale: int = param(2, lo=1, hi=8, doc="Pixels from sample to sample; 1: every pixel asks.")
+    angle: float = param(
+        25.0, lo=0.0, hi=180.0, doc="A sample stands for pixels whose normals differ by less, degrees."
+    )
+    slack: float = param(
+        0.5, lo=0.0, hi=16.0, doc="And that lie no farther off its plane, in steps of the grid at their distance."
+    )
+
+
+class SamplePixels(Pass):
+    """The samples of a frame."""
+
+    Params = Params
+    figures = (SAMPLES,)
+    inputs: ClassVar[Mapping[str, Input]] = {
+        "depth": Input("reversed depth", format="depth32f"),
+        "normals": Input("shading and geometric normal", format="rgba16"),
+    }
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Return textures of the frame's size, which have room for all pixels."""
+        del inputs
+        defines = {"SCALE": self.params.scale}
+        where = "position, and depth of view; 0 where there is no sample or nothing was seen"
+        weights = "what the pixel takes of the four samples around it, or the texel of its own sample"
+        return {
+            "layout": describe_layout(),
+            "positions": Output(where, Texture("rgba32f")),
+            "sample_normals": Output("shading and geometric normal of samples", Texture("rgba16")),
+            "pixels": Output("number of the pixel of each sample", Texture("r32ui"), attach=False),
+            "blend": Output(weights, Texture("r32ui"), defines, attach=False),
+        }
+
+    def depends(self) -> frozenset[str]:
+        """The camera, since positions are reconstructed from the depth; and the seed, which moves the grid."""
+        return frozenset({"camera", "models", "seed"})
+
+    def unneeded(self, facts: Facts) -> str | None:
+        """Leave the pass out where there are no VPLs."""
+        return None if facts[VPLS] else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Find lonely pixels, then gather the samples' surfaces."""
+        layout = Layout.of_frame(frame.size, self.params.scale, frame.seed)
+        defines = {"SMOOTH": int(frame.smooth)}
+        listed = self._find_lonely(layout, io, defines) if self.params.scale > 1 else np.zeros(0, int)
+        layout = replace(layout, listed=len(listed))
+        if len(listed):
+            _tell_places(io, layout, listed)
+        write_layout(io, layout)
+        io["pixels"].upload(layout.place(listed)[..., None])
+        io["pixels"].bind_image(0)
+        io.framebuffer.bind()
+        for target in range(2):
+            io.framebuffer.clear_color(target)
+        draw_samples(io, io.program("sample_pixels/surfaces.frag", defines=defines), layout)
+        columns, rows = layout.grid
+        io.report(SAMPLES.name, columns * rows + len(listed))
+
+    def _find_lonely(self, layout: Layout, io: Io, defines: Mapping[str, int | float]) -> Ints:
+        """Draw `blend`. Returns the numbers of lonely pixels, ascending."""
+        io["blend"].framebuffer.bind()
+        program = io.program("sample_pixels/blend.frag", defines=defines)
+        cosine = cos(radians(self.params.angle))
+        program.set(offset=layout.offset, cosine=cosine, slack=self.params.slack)
+        program.draw_fullscreen()
+        io["blend"].touch()
+        listed: Ints = np.flatnonzero(io["blend"].read() == LONELY)
+        return listed
+
+
+def _tell_places(io: Io, layout: Layout, listed: Ints) -> None:
+    """Write into `blend` which texels the samples of the pixels `listed` have."""
+    blend = io["blend"].read()
+    blend.reshape(-1)[listed] = LONELY | layout.find_list_places().astype(np.uint32)
+    io["blend"].upload(blend)
+
+
+PASS = SamplePixels

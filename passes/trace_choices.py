@@ -1,0 +1,65 @@
+"""Ask by rays which of its choices each sample sees: choices, lists, samples -> one bit a choice.
+
+Samples and choices are read back, Embree traces on the CPU, and the answers go up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.vpl_params import VPLS
+from deferred_ir.graph.facts import Facts
+from deferred_ir.graph.figures import Figure
+from deferred_ir.graph.pass_base import Pass
+from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.rays.visibility import find_seen
+
+NOBODY = 0xFFFFFFFF
+"""A choice of no VPL, as in shaders/lib/pool/list.glsl."""
+TEXELS = 4
+"""Texels of a VPL in `lists`; the first has its position."""
+RAYS = Figure("choice_rays", "Shadow rays to the VPLs that samples have chosen.", ("choice_rays",))
+
+
+class TraceChoices(Pass):
+    """Which choices are seen."""
+
+    figures = (RAYS,)
+    inputs: ClassVar[Mapping[str, Input]] = {
+        "choices": Input("places in the lists", format="rgba32ui"),
+        "lists": Input("VPLs for each tile", format="rgba32f"),
+        "positions": Input("where samples are", format="rgba32f"),
+        "sample_normals": Input("their normals", format="rgba16"),
+    }
+
+    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Return one texture of the frame's size."""
+        del inputs
+        return {"seen": Output("bit k: whether the sample sees choice k", Texture("r32ui"), attach=False)}
+
+    def depends(self) -> frozenset[str]:
+        """What lies between samples and VPLs."""
+        return frozenset({"models"})
+
+    def unneeded(self, facts: Facts) -> str | None:
+        """Leave the pass out where there are no VPLs."""
+        return None if facts[VPLS] else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
+
+    def execute(self, frame: Frame, io: Io) -> None:
+        """Read back, trace, upload."""
+        samples = frame.read_samples(io["positions"], io["sample_normals"])
+        places = np.ascontiguousarray(io["lists"].read().reshape(-1, TEXELS, 4)[:, 0, :3])
+        choices = io["choices"].read().reshape(-1, 4)[samples.pixel]
+        bits, rays = find_seen(frame.tracer(), samples, places, choices, NOBODY)
+        image = np.zeros(frame.size[0] * frame.size[1], np.uint32)
+        image[samples.pixel] = bits
+        io["seen"].upload(image.reshape(frame.size[1], frame.size[0], 1))
+        io.count(RAYS.name, rays)
+
+
+PASS = TraceChoices

@@ -1,0 +1,34 @@
+// Irradiance of a sample: what each of its choices that it sees brings, by the choice's weight.
+#include "lib/pool/samples.glsl"
+#include "lib/pool/list.glsl"
+
+layout(binding = UNIT_POSITIONS) uniform sampler2D positions;
+layout(binding = UNIT_SAMPLE_NORMALS) uniform sampler2D sample_normals;
+layout(binding = UNIT_LISTS) uniform sampler2D lists;
+layout(binding = UNIT_CHOICES) uniform usampler2D choices;
+layout(binding = UNIT_WEIGHTS) uniform sampler2D weights;
+layout(binding = UNIT_SEEN) uniform usampler2D seen;
+#if HAS_NEAR_FIELD
+layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
+#endif
+
+layout(location = 0) out vec4 irradiance;
+
+void main() {
+    ivec2 place = ivec2(gl_FragCoord.xy);
+    irradiance = vec4(0.0);
+    Sample s = read_sample(positions, sample_normals, place);
+    if (s.depth <= 0.0) return;
+    uvec4 chosen = texelFetch(choices, place, 0);
+    vec4 weight = texelFetch(weights, place, 0);
+    uint bits = texelFetch(seen, place, 0).r;
+    for (int k = 0; k < RAYS; ++k) {
+        if ((bits >> k & 1u) == 0u) continue;
+        int tile = int(chosen[k] / uint(LIST_ENTRIES)), number = int(chosen[k] % uint(LIST_ENTRIES));
+        float kernel = entry_kernel(read_entry(lists, tile, number), s.position, s.normal, s.shading_normal);
+        irradiance.rgb += read_emission(lists, tile, number) * (weight[k] * kernel);
+    }
+#if HAS_NEAR_FIELD
+    irradiance.rgb += texelFetch(near_field, place, 0).rgb;
+#endif
+}

@@ -53,7 +53,9 @@ class FilterSamples(Pass):
         """Return two textures of the frame's size, between which the steps go back and forth."""
         del inputs
         return {
-            "filtered": Output("irradiance; alpha: variance of its luminance", Texture("rgba32f"), attach=False),
+            "filtered": Output(
+                "irradiance; alpha: standard deviation of its luminance", Texture("rgba32f"), attach=False
+            ),
             "scratch": Output("the same, a step before", Texture("rgba32f"), attach=False),
         }
 

@@ -19,7 +19,7 @@ from deferred_ir.frame.vpl_params import VPLS
 from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
-from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.pool.proposals import GROUPS, Groups, draw_lists
 from deferred_ir.pool.samples import read_layout
 from deferred_ir.sampling import streams
@@ -28,6 +28,7 @@ TILES = 16
 """Tiles along an edge of the image, whatever its size."""
 TEXELS = 4
 """Texels of a VPL in a list: position, power times weight; normal, clamp^2; emission, weight; one that aligns them."""
+NUMBER = np.dtype("u4")
 
 
 @dataclass(frozen=True)
@@ -52,10 +53,12 @@ class ProposeVpls(Pass):
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return the scores of groups in tiles, and the lists."""
         del inputs
+        numbers = Buffer("number", self.params.entries * TILES**2, NUMBER.itemsize)
         lists = Texture("rgba32f", (TEXELS * self.params.entries, TILES**2))
         defines: dict[str, int | float] = {"LIST_ENTRIES": self.params.entries, "TILES": TILES}
         return {
             "scores": Output("what each group would bring to each tile", Texture("r32f", (GROUPS, TILES**2))),
+            "numbers": Output("numbers in the pool of the VPLs of all lists", numbers),
             "lists": Output("a row for each tile, four texels a VPL", lists, defines, attach=False),
         }
 
@@ -76,7 +79,9 @@ class ProposeVpls(Pass):
         program.draw_fullscreen()
         groups = Groups.of_power(records["emission"] @ LUMINANCE)
         scores = io["scores"].read()[..., 0][:, : len(groups.power)]
-        io["lists"].upload(_pack_lists(records, *draw_lists(scores, groups, self.params.entries, rng)))
+        found, weight = draw_lists(scores, groups, self.params.entries, rng)
+        io["numbers"].write(found.reshape(-1).astype(NUMBER))
+        io["lists"].upload(_pack_lists(records, found, weight))
 
 
 def _pack_lists(records: np.ndarray, found: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -21,8 +21,6 @@ from deferred_ir.rays.visibility import find_seen
 
 NOBODY = 0xFFFFFFFF
 """A choice of no VPL, as in shaders/lib/pool/list.glsl."""
-TEXELS = 4
-"""Texels of a VPL in `lists`; the first has its position."""
 RAYS = Figure("choice_rays", "Shadow rays to the VPLs that samples have chosen.", ("choice_rays",))
 
 
@@ -32,7 +30,8 @@ class TraceChoices(Pass):
     figures = (RAYS,)
     inputs: ClassVar[Mapping[str, Input]] = {
         "choices": Input("places in the lists", format="rgba32ui"),
-        "lists": Input("VPLs for each tile", format="rgba32f"),
+        "vpls": Input("the pool", format="vpl"),
+        "numbers": Input("numbers in the pool of the VPLs of all lists", format="number"),
         "positions": Input("where samples are", format="rgba32f"),
         "sample_normals": Input("their normals", format="rgba16"),
     }
@@ -52,13 +51,17 @@ class TraceChoices(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Read back, trace, upload."""
-        samples = frame.read_samples(io["positions"], io["sample_normals"])
-        places = np.ascontiguousarray(io["lists"].read().reshape(-1, TEXELS, 4)[:, 0, :3])
-        choices = io["choices"].read().reshape(-1, 4)[samples.pixel]
-        bits, rays = find_seen(frame.tracer(), samples, places, choices, NOBODY)
-        image = np.zeros(frame.size[0] * frame.size[1], np.uint32)
+        (width, height), vpls, numbers = frame.size, io["vpls"].records, io["numbers"].records
+        image = np.zeros(height * width, np.uint32)
+        if not len(vpls):
+            io["seen"].upload(image.reshape(height, width, 1))
+            return
+        samples, tracer = frame.read_samples(io["positions"], io["sample_normals"]), frame.tracer()
+        places = tracer.lift(vpls["position"], vpls["z_axis"])  # off their surfaces, beside which walls may stand
+        choices = io["choices"].read().reshape(-1, 4).take(samples.pixel, axis=0)
+        bits, rays = find_seen(tracer, samples, places.take(numbers, axis=0), choices, NOBODY)
         image[samples.pixel] = bits
-        io["seen"].upload(image.reshape(frame.size[1], frame.size[0], 1))
+        io["seen"].upload(image.reshape(height, width, 1))
         io.count(RAYS.name, rays)
 
 

@@ -1,10 +1,11 @@
 // A step of the filter: the mean of 3 x 3 samples `apart` from each other, of those on the sample's own surface.
 #include "lib/camera/frame.glsl"
 #include "lib/colour.glsl"
+#include "lib/lights/light.glsl"
 #include "lib/pool/blend.glsl"
 #include "lib/pool/samples.glsl"
 
-layout(binding = UNIT_IRRADIANCE) uniform sampler2D irradiance;  // alpha: variance, from the second step on
+layout(binding = UNIT_IRRADIANCE) uniform sampler2D irradiance;  // alpha: standard deviation, from the second step on
 layout(binding = UNIT_POSITIONS) uniform sampler2D positions;
 layout(binding = UNIT_SAMPLE_NORMALS) uniform sampler2D sample_normals;
 uniform ivec2 grid;  // samples
@@ -62,35 +63,43 @@ void main() {
     }
     float off = slack * pixel * float(apart), level = luminance(own.rgb);
 #if !FIRST
-    float deviation = tolerance * sqrt(own.a) + 1e-3 * level;
-    float reciprocal = 0.5 / max(deviation, 1e-37);
+    float reciprocal = 0.5 / max(tolerance * own.a + 1e-3 * level, TINY);
 #endif
     vec3 sum = vec3(0.0);
-    float total = 0.0, mean = 0.0, squares = 0.0;
-    for (int y = -1; y <= 1; ++y)
-        for (int x = -1; x <= 1; ++x) {
-            ivec2 other = place + ivec2(x, y) * apart, inside = clamp(other, ivec2(0), grid - 1);
-            Sample t = read_sample(positions, sample_normals, inside);
-            vec4 light = texelFetch(irradiance, inside, 0);
-            float l = luminance(light.rgb);
-            float weight = other == inside && on_surface(s, t, off) ? 1.0 : 0.0;
+    float total = 0.0, mean = 0.0, most = TINY, weights[9], values[9];
+    for (int i = 0; i < 9; ++i) {
+        ivec2 step = ivec2(i % 3 - 1, i / 3 - 1), other = place + step * apart, inside = clamp(other, ivec2(0), grid - 1);
+        Sample t = read_sample(positions, sample_normals, inside);
+        vec4 light = texelFetch(irradiance, inside, 0);
+        float l = luminance(light.rgb), weight = other == inside && on_surface(s, t, off) ? 1.0 : 0.0;
 #if FIRST
-            mean += weight * l;
-            squares += weight * (l - level) * (l - level);
+        mean += weight * l;
+        values[i] = abs(l - level);
 #else
-            float deviations = (l - level) * reciprocal;
-            // A B-spline in space; a parabola over the difference in light.
-            weight *= (x == 0 ? 1.0 : 0.667) * (y == 0 ? 1.0 : 0.667) * max(1.0 - deviations * deviations, 0.0);
-            squares += weight * weight * light.a;
+        float deviations = (l - level) * reciprocal;
+        // A B-spline in space; a parabola over the difference in light.
+        weight *= (step.x == 0 ? 1.0 : 0.667) * (step.y == 0 ? 1.0 : 0.667) * max(1.0 - deviations * deviations, 0.0);
+        values[i] = light.a;
 #endif
-            sum += weight * light.rgb;
-            total += weight;
-        }
+        weights[i] = weight;
+        most = max(most, weight > 0.0 ? values[i] : 0.0);
+        sum += weight * light.rgb;
+        total += weight;
+    }
     filtered.rgb = sum / total;  // the sample itself counts
+    float squares = 0.0;  // over those of `most`: squares of light itself may leave the range of floats
+    for (int i = 0; i < 9; ++i) {
+        float value = weights[i] > 0.0 ? values[i] / most : 0.0;
 #if FIRST
-    float shift = mean / total - level;
-    filtered.a = max(squares / total - shift * shift, 0.0) / max(total - 1.0, 1.0);
+        squares += weights[i] * value * value;
 #else
-    filtered.a = squares / (total * total);
+        squares += weights[i] * weights[i] * value * value;
+#endif
+    }
+#if FIRST
+    float shift = (mean / total - level) / most;
+    filtered.a = most * sqrt(max(squares / total - shift * shift, 0.0) / max(total - 1.0, 1.0));
+#else
+    filtered.a = most * sqrt(squares) / total;
 #endif
 }

@@ -28,7 +28,7 @@ from tqdm import tqdm
 ROOT = Path(__file__).resolve().parent.parent
 SIZE = (96, 64)
 VPLS = 32
-GRAPHS = ("forward", "deferred", "hemisphere", "interleaved", "accurate", "incremental")
+GRAPHS = ("forward", "deferred", "hemisphere", "interleaved", "accurate", "resampled", "incremental")
 SCENES = ("cornell", "atrium", "colors")
 
 BOX = "v -1 -1 -1\nv 1 -1 -1\nv -1 1 -1\nv 1 1 -1\nv -1 -1 1\nv 1 -1 1\nv -1 1 1\nv 1 1 1\n"
@@ -131,7 +131,8 @@ def cases(extra: list[str]) -> Iterator[Case]:
             yield Case(scene, graph, times=times)
             yield Case(scene, graph, times=times, reuse=True)
         for key, value in {"vpl.clamp": 0.0, "shadow_maps.spot_size": 256, "tonemap.operator": "aces"}.items():
-            yield Case("soft", graph, {key: value})
+            if graph != "resampled" or not key.startswith("shadow_maps"):  # it has no maps
+                yield Case("soft", graph, {key: value})
     for graph in ("forward", "deferred", "interleaved", "accurate"):
         yield Case("cornell", graph, {"vpl.bounces": 3})
         yield Case("room", graph, {"vpl.candidates": 4, "vpl.pattern": "halton"})
@@ -149,6 +150,9 @@ def cases(extra: list[str]) -> Iterator[Case]:
         yield from (Case("cornell", graph, {"interleave.n": n}) for n in (1, 2, 8))
         yield Case("room", graph, {"gather.angle": 60.0, "gather.fewest": 0.9})
         yield Case("cornell", graph, {"interleave.n": 8}, seeds=(0, 1, 1), reuse=True)
+    for scale in (1, 3, 4):
+        yield Case("soft", "resampled", {"sample_pixels.scale": scale, "vpl.bounces": 2}, seeds=(0, 1, 1), reuse=True)
+    yield Case("cornell", "resampled", {"choose_vpls.rays": 1, "filter_samples.steps": 0, "propose_vpls.entries": 64})
     for visibility in ("maps", "rays"):
         yield Case("soft", "accurate", {"shadow_rays.visibility": visibility}, seeds=(0, 1, 1))
         yield Case("cornell", "accurate", {"shadow_rays.visibility": visibility, "near_field.samples": 0.5})

@@ -20,7 +20,7 @@ def find_seen(
 ) -> tuple[Ints, int]:
     """Return a bit for each point that a surface sees, uint8 (n,), and the number of rays.
 
-    at: n surfaces. places: float32 (m, 3), points off their surfaces, in world units. chosen: (n, k), k up to 8, which
+    at: n surfaces. places: float32 (m, 3), points, lifted off their surfaces (`Tracer.lift`). chosen: (n, k), k up to 8, which
     of them each surface asks; `nobody` asks for none. Results do not depend on the number of `threads`.
     """
     tasks = [slice(start, start + SURFACES) for start in range(0, len(chosen), SURFACES)]
@@ -31,7 +31,7 @@ def find_seen(
         origins = tracer.lift(at.position[rows], at.normal[rows]).take(number // chosen.shape[1], axis=0)
         targets = places.take(chosen[rows].reshape(-1)[number], axis=0)
         seen = np.zeros(asked.shape, bool)
-        seen.reshape(-1)[number] = ~tracer.occluded(origins, targets)
+        seen.reshape(-1)[number] = ~tracer.occluded(origins, targets, lifted=True)
         bits: Ints = np.packbits(seen, axis=1, bitorder="little")[:, 0]
         return bits, len(number)
 

@@ -184,6 +184,7 @@ GRAPHS = (
     *(replace(case, against="rays", slack=SAME) for case in _repeat("hemisphere", *TWICE)),
     *_repeat("interleaved", *LINEAR, BOX),
     *_repeat("accurate", *LINEAR, BOX),
+    *_repeat("resampled", *LINEAR, BOX, "0 VPLs", "1 VPLs", "light grazing a wall", "slivers of 1e-6", *TWICE[:1]),
     *_repeat("incremental", *LINEAR, BOX),
 )
 """Cases that matter for single maps, paraboloid maps and the passes of other graphs, repeated with those."""

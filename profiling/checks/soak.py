@@ -43,6 +43,7 @@ SETTINGS: tuple[dict[str, Any], ...] = (
     {"graph": "interleaved", "size": (48, 32), "set": {"vpl.count": 16}},
     {"graph": "incremental", "size": (48, 32), "set": {"vpl.count": 16}},
     {"graph": "accurate", "size": (48, 32), "set": {"vpl.count": 16}},
+    {"graph": "resampled", "size": (48, 32), "set": {"vpl.count": 4}},
     {"graph": "forward", "size": (48, 32), "set": {"vpl.count": 4, "shadow_maps.spot_size": 256}},
 )
 

@@ -150,7 +150,7 @@ def assert_same(found: np.ndarray, expected: np.ndarray) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6 * expected.max())
 
 
-GRAPHS = ["deferred", "forward", "interleaved", "accurate"]
+GRAPHS = ["deferred", "forward", "interleaved", "accurate", "resampled"]
 
 
 @pytest.mark.parametrize("graph", GRAPHS)

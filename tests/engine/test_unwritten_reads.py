@@ -11,7 +11,16 @@ from deferred_ir.engine.unwritten_reads import unwritten_reads
 from deferred_ir.gl.framebuffers import Framebuffer
 
 SIZE = (40, 28)
-GRAPHS = ["forward", "deferred", "hemisphere", "interleaved", "accurate", "accurate by rays", "incremental"]
+GRAPHS = [
+    "forward",
+    "deferred",
+    "hemisphere",
+    "interleaved",
+    "accurate",
+    "accurate by rays",
+    "incremental",
+    "resampled",
+]
 SETTINGS = {"vpl.count": 16, "shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 16}
 OPEN = build(plane(), sphere(0.3))
 """With background."""
@@ -19,7 +28,8 @@ OPEN = build(plane(), sphere(0.3))
 
 def found(renderer, graph, scene, vpls=16):
     name, *rays = graph.split(" by ")
-    settings = {**SETTINGS, "vpl.count": vpls} | ({"shadow_rays.visibility": "rays"} if rays else {})
+    maps = SETTINGS if name != "resampled" else {}
+    settings = {**maps, "vpl.count": vpls} | ({"shadow_rays.visibility": "rays"} if rays else {})
     one = renderer(SIZE, name, set=settings)
     return unwritten_reads(one, scene, one.plan(scene))
 

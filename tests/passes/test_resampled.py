@@ -203,3 +203,54 @@ def test_figures_tell_samples_and_rays(renderer):
     samples, rays = one.executor.counters["samples"], one.executor.counters["choice_rays"]
     assert 300 < samples <= 1200
     assert 0 < rays <= 4 * samples
+
+
+def views(scene):
+    """Scenes and options of frames that follow each other: each changes one thing."""
+    light, camera = scene.spotlight, scene.camera
+    yield scene, {}
+    yield replace(scene, camera=replace(camera, fov=camera.fov - 5)), {}
+    yield replace(scene, spotlight=replace(light, emission=(3.0, 2.0, 1.0))), {}
+    yield replace(scene, spotlight=replace(light, emission=(3.0, 2.0, 1.0))), {"seed": 2}
+    yield replace(scene, spotlight=replace(light, position=(0.1, 0.8, 0.2))), {"seed": 2}
+    yield replace(scene, spotlight=replace(light, emission=(0.0, 0.0, 0.0))), {}
+    yield build(plane()), {}
+    yield scene, {}
+
+
+def test_reused_frames_are_those_drawn_anew(renderer):
+    settings = {"vpl.count": 8}
+    one, other = (renderer((32, 24), "resampled", set=settings, reuse=reuse) for reuse in (True, False))
+    for scene, options in views(room()):
+        assert same_pixels(one.render(scene, **options), other.render(scene, **options))
+
+
+def test_a_still_frame_runs_nothing(renderer):
+    one, scene = renderer((32, 24), "resampled", set={"vpl.count": 8}, reuse=True), room()
+    plan = one.plan(scene)
+    one.draw(scene, plan)
+    assert not one.executor.skipped
+    one.draw(scene, plan)
+    assert set(one.executor.skipped) == {step.name for step in plan.steps}
+
+
+def test_a_filters_slider_casts_nothing_and_asks_no_ray(renderer):
+    one, scene = renderer((32, 24), "resampled", set={"vpl.count": 8}, reuse=True), room()
+    one.draw(scene, one.plan(scene))
+    one.configure(set={"vpl.count": 8, "filter_samples.tolerance": 2.0})
+    plan = one.plan(scene)
+    one.draw(scene, plan)
+    ran = {step.name for step in plan.steps} - set(one.executor.skipped)
+    assert ran == {"filter_samples", "blend_samples", "lighting", "tonemap"}
+
+
+def test_what_a_scene_does_not_need_is_left_out(renderer):
+    one, full = renderer((32, 24), "resampled"), renderer((32, 24), "resampled", keep_all=True)
+    assert {step.name for step in one.plan(room(), 0).steps} == {
+        *("lights", "vpl", "gbuffer", "direct_rays", "lighting", "tonemap")
+    }
+    assert same_pixels(one.render(room(), vpls=0), full.render(room(), vpls=0))
+    dark = replace(room(), spotlight=replace(room().spotlight, emission=(0.0, 0.0, 0.0)))
+    assert "direct_rays" in one.plan(dark, 4).left_out
+    assert not one.render(dark, vpls=4).radiance.any()
+    assert same_pixels(one.render(room(), vpls=4), full.render(room(), vpls=4))

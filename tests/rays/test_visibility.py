@@ -29,7 +29,7 @@ def test_bits_are_the_answers_of_single_rays(rays, threads):
     starts = tracer.lift(at.position, at.normal)
     for k in range(rays):
         asked = chosen[:, k] != NOBODY
-        seen = ~tracer.occluded(starts[asked], places[chosen[asked, k]])
+        seen = ~tracer.occluded(starts[asked], places[chosen[asked, k]], lifted=True)
         assert 0.1 < seen.mean() < 0.99
         assert ((bits >> k & 1 == 1)[asked] == seen).all()
         assert not (bits >> k & 1)[~asked].any()

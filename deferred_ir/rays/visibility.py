@@ -20,8 +20,9 @@ def find_seen(
 ) -> tuple[Ints, int]:
     """Return a bit for each point that a surface sees, uint8 (n,), and the number of rays.
 
-    at: n surfaces. places: float32 (m, 3), points, lifted off their surfaces (`Tracer.lift`). chosen: (n, k), k up to 8, which
-    of them each surface asks; `nobody` asks for none. Results do not depend on the number of `threads`.
+    at: n surfaces. places: float32 (m, 3), points in world units, lifted off their surfaces (`Tracer.lift`). chosen:
+    (n, k), k up to 8, which of them each surface asks; `nobody` asks for none. Results do not depend on the number of
+    `threads`.
     """
     tasks = [slice(start, start + SURFACES) for start in range(0, len(chosen), SURFACES)]
 

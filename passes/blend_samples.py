@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.frame.vpl_params import VPLS
+from deferred_ir.frame.vpl_params import explain_no_vpls
 from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
@@ -34,7 +34,7 @@ class BlendSamples(Pass):
 
     def unneeded(self, facts: Facts) -> str | None:
         """Leave the pass out where there are no VPLs."""
-        return None if facts[VPLS] else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
+        return explain_no_vpls(facts)
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Draw all pixels."""

@@ -16,7 +16,7 @@ import numpy as np
 from deferred_ir.base.arrays import Ints
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.frame.vpl_params import VPLS
+from deferred_ir.frame.vpl_params import explain_no_vpls
 from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.params import param
@@ -71,7 +71,7 @@ class SamplePixels(Pass):
 
     def unneeded(self, facts: Facts) -> str | None:
         """Leave the pass out where there are no VPLs."""
-        return None if facts[VPLS] else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
+        return explain_no_vpls(facts)
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Find lonely pixels, then gather the samples' surfaces."""

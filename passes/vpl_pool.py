@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -19,20 +18,22 @@ from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Output, Texture
 from deferred_ir.pool.proposals import GROUPS, Groups, order_along_curve
 from deferred_ir.sampling import streams
-from deferred_ir.sampling.patterns import warn_unbalanced
 from deferred_ir.vpls.cast import NONE, cast
+
+MOST = 1 << 17
+"""Rays beyond which a larger pool would cost more than it gains."""
 
 
 @dataclass(frozen=True)
 class Params(CastParams):
     """Parameters of the pool."""
 
-    candidates: int = param(64, lo=1, hi=1024, doc="VPLs in the pool for each of `count`.")
+    candidates: int = param(64, lo=1, hi=1024, doc="VPLs in the pool for each of `count`; 131072 at most.")
 
     @property
     def pool(self) -> int:
-        """Rays that leave the spotlight."""
-        return self.count * self.candidates
+        """Rays that leave the spotlight: `candidates` for each of `count`, but no more than MOST, or `count` itself."""
+        return max(min(self.count * self.candidates, MOST), self.count)
 
     @property
     def clamp_fraction(self) -> float:
@@ -45,10 +46,6 @@ class VplPool(Pass):
 
     Params = Params
     figures = (VPLS_ALIVE,)
-
-    def __init__(self, params: Any = None) -> None:
-        super().__init__(params)
-        warn_unbalanced(self.params.pattern, self.params.pool)
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return a buffer with room for a VPL per ray and bounce, and a texture of groups."""

@@ -22,6 +22,12 @@ CLAMP_RETURNED = Fact("clamp_returned", unknown=False, doc="Short rays add the l
 
 VPLS_ALIVE = Figure("vpls_alive", "VPLs that shine.", ("vpls_alive",))
 
+
+def explain_no_vpls(facts: Facts) -> str | None:
+    """Return why a pass that works on VPLs is not needed; None if there may be VPLs."""
+    return None if facts[VPLS] else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
+
+
 AUTO_CLAMP = 0.64
 """Clamp distance of one VPL in diagonals where short rays give back what it takes: best at 64 to 1024 VPLs of both a
 room and a cathedral, and flat about there (half or twice of it costs a tenth to a half of the error)."""

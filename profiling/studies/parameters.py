@@ -1,6 +1,6 @@
-"""Measure what parameters of the graph `accurate` cost and gain: near-field rays, clamp, candidates, visibility.
+"""Measure what parameters of the graphs `accurate` and `resampled` cost and gain.
 
-    python -m deferred_ir.profiling.studies.accurate cornell colors atrium
+    python -m deferred_ir.profiling.studies.parameters cornell colors atrium
 
 Each row changes one parameter and leaves the others at their defaults. The settings take turns in one process, so that
 a noisy machine disturbs them alike. The reference is path-traced (`--spp`), or `--reference F.npz` with the arrays
@@ -34,7 +34,25 @@ FACTORS = 0.16, 0.32, 0.64, 1.28
 CANDIDATES = 1, 4, 16, 64
 VISIBILITY = "maps", "rays"
 TABLES = "samples", "clamp", "candidates", "visibility"
-PASS = {"samples": "near_field", "candidates": "vpl"}
+RESAMPLED: Mapping[str, tuple[str, Sequence[int]]] = {
+    "scale": ("sample_pixels.scale", (1, 2, 3, 4)),
+    "pool": ("vpl.candidates", (4, 16, 64, 256)),
+    "entries": ("propose_vpls.entries", (128, 256, 512, 1024)),
+    "draws": ("choose_vpls.draws", (8, 16, 32, 64, 128)),
+    "rays": ("choose_vpls.rays", (1, 2, 4)),
+    "steps": ("filter_samples.steps", (0, 1, 2, 3, 4)),
+}
+"""The parameter of `resampled` that a table changes, and its values."""
+PASS = {
+    "samples": "near_field",
+    "candidates": "vpl",
+    "scale": "sample_pixels",
+    "pool": "vpl",
+    "entries": "propose_vpls",
+    "draws": "choose_vpls",
+    "rays": "trace_choices",
+    "steps": "filter_samples",
+}
 """The pass whose time a table shows besides the frame's."""
 
 
@@ -50,6 +68,9 @@ class Variant:
 
 def settings(table: str, vpls: int) -> dict[str, dict[str, Any]]:
     """Return the settings of a table's rows by the rows' names, as `--set` takes them."""
+    if table in RESAMPLED:
+        key, values = RESAMPLED[table]
+        return {f"{value}": {key: value} for value in values}
     tables: dict[str, dict[str, dict[str, Any]]] = {
         "samples": {f"{n:g}": {"near_field.samples": n} for n in SAMPLES},
         "clamp": {f"{f:g} / sqrt(N)": {"vpl.clamp": f / sqrt(vpls)} for f in FACTORS},
@@ -64,7 +85,8 @@ def measure(scene: Scene, truth: Mapping[str, Any], table: str, chosen: argparse
     with ExitStack() as stack:
         variants = {}
         for name, changed in settings(table, chosen.vpls).items():
-            renderer = stack.enter_context(Renderer(chosen.size, "accurate", set=changed))
+            graph = "resampled" if table in RESAMPLED else "accurate"
+            renderer = stack.enter_context(Renderer(chosen.size, graph, set=changed))
             variants[name] = Variant(renderer, renderer.plan(scene, chosen.vpls, ["radiance"]))
             renderer.draw(scene, variants[name].plan, seed=chosen.seeds)  # compiles and allocates: is not measured
         for seed, variant in take_turns(list(variants.values()), chosen.seeds, f"{scene.name}, {table}"):
@@ -87,8 +109,9 @@ def row(scene: str, table: str, name: str, variant: Variant) -> Sequence[str]:
 
 def report(chosen: argparse.Namespace) -> None:
     """Print each chosen table with a row for each scene and setting."""
-    if unknown := set(chosen.tables) - set(TABLES):
-        raise SettingError(f"--tables: no '{min(unknown)}'; there are {', '.join(TABLES)}")
+    known = (*TABLES, *RESAMPLED)
+    if unknown := set(chosen.tables) - set(known):
+        raise SettingError(f"--tables: no '{min(unknown)}'; there are {', '.join(known)}")
     scenes = [load(name) for name in chosen.scenes]
     truths = [read_or_trace(scene, chosen) for scene in scenes]
     for table in chosen.tables:

@@ -1,5 +1,6 @@
 // What a group of the pool, a column, would bring to a tile, a row: the root of the sum of squares over a few samples of
-// the tile, without shadows and in no unit.
+// the tile, without shadows and in no unit. A few samples miss what lies close to others, so the group's distance alone
+// counts as well: without it, VPLs that are near and rarely drawn give bright spots.
 #include "lib/pool/samples.glsl"
 #include "lib/lights/vpl_kernel.glsl"
 
@@ -12,17 +13,29 @@ uniform float area;  // makes the kernel a number without unit
 
 layout(location = 0) out float score;
 
+const float AROUND = 0.05;  // part of what distance alone would bring
+
 void main() {
     int group = int(gl_FragCoord.x), tile = int(gl_FragCoord.y);
     vec4 at = texelFetch(groups, ivec2(group, 0), 0), normal = texelFetch(groups, ivec2(group, 1), 0);
-    float sum = 0.0;
+    Sample probes[4];
+    float extent = 0.0;  // of the tile, squared
     for (int i = 0; i < 4; ++i) {
         vec2 place = (vec2(tile % TILES, tile / TILES) + 0.5 * (vec2(i & 1, i >> 1) + shift)) / float(TILES);
-        Sample s = read_sample(positions, sample_normals, min(ivec2(place * vec2(grid)), grid - 1));
+        probes[i] = read_sample(positions, sample_normals, min(ivec2(place * vec2(grid)), grid - 1));
+        vec3 apart = probes[i].position - probes[0].position;
+        if (probes[i].depth > 0.0 && probes[0].depth > 0.0) extent = max(extent, dot(apart, apart));
+    }
+    float sum = 0.0, around = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        Sample s = probes[i];
         vec3 from = s.position - at.xyz;
         float brings = vpl_kernel(from, normal.xyz, s.normal, s.shading_normal, POOL_EDGE, normal.w) * area;
+        float near = area / max(dot(from, from), max(0.25 * extent, max(normal.w, TINY)));
         brings = s.depth > 0.0 ? min(brings, 1e15) : 0.0;  // its square is a float
+        near = s.depth > 0.0 ? min(near, 1e15) : 0.0;
         sum += brings * brings;
+        around += near * near;
     }
-    score = at.w * sqrt(sum);
+    score = at.w * (sqrt(sum) + AROUND * sqrt(around));
 }

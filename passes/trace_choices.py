@@ -17,7 +17,7 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
-from deferred_ir.rays.visibility import find_seen
+from deferred_ir.rays.seen_points import find_seen
 
 NOBODY = 0xFFFFFFFF
 """A choice of no VPL, as in shaders/lib/pool/list.glsl."""

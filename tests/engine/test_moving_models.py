@@ -150,7 +150,7 @@ def assert_same(found: np.ndarray, expected: np.ndarray) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6 * expected.max())
 
 
-GRAPHS = ["deferred", "forward", "interleaved", "accurate", "resampled"]
+GRAPHS = ["deferred", "forward", "interleaved", "accurate"]
 
 
 @pytest.mark.parametrize("graph", GRAPHS)
@@ -162,6 +162,20 @@ def test_a_moved_scene_looks_as_if_made_so(renderer: Callable[..., Renderer], gr
         np.testing.assert_array_equal(direct, other.render(bake(scene, time), vpls=0).radiance)
         found = one.render(scene, vpls=8, time=time).radiance
         assert_same(found, other.render(bake(scene, time), vpls=8).radiance)
+    assert not np.array_equal(found, one.render(scene, vpls=8, time=0.7).radiance)
+
+
+def test_pixels_that_choose_vpls_choose_the_same_but_for_roundings(renderer: Callable[..., Renderer]):
+    one, other = renderer(SIZE, "resampled"), renderer(SIZE, "resampled")
+    scene = room_with_moving_models()
+    for time in (0.0, 0.7, 0.2):
+        direct = one.render(scene, vpls=0, time=time).radiance
+        np.testing.assert_array_equal(direct, other.render(bake(scene, time), vpls=0).radiance)
+        found = one.render(scene, vpls=8, time=time).radiance
+        expected = other.render(bake(scene, time), vpls=8).radiance
+        off = np.abs(found - expected).max(axis=-1) > 1e-5 * expected.max()
+        assert off.mean() < 0.05  # the filter spreads a choice that flips
+        assert found.mean() == pytest.approx(expected.mean(), rel=1e-3)
     assert not np.array_equal(found, one.render(scene, vpls=8, time=0.7).radiance)
 
 

@@ -5,8 +5,8 @@ import pytest
 from small_scenes import crooked_room
 
 from deferred_ir.rays.pixel_surfaces import Surfaces
+from deferred_ir.rays.seen_points import find_seen
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.rays.visibility import find_seen
 from deferred_ir.truth.path_tracer import PathTracer
 
 NOBODY = 0xFFFFFFFF

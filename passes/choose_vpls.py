@@ -55,8 +55,8 @@ class ChooseVpls(Pass):
             )
         defines = {"RAYS": p.rays}
         return {
-            "choices": Output("places in the lists, tile by tile", Texture("rgba32ui"), defines),
-            "weights": Output("by which each choice stands for others", Texture("rgba32f")),
+            "choices": Output("places in the lists, tile by tile", Texture("rgba32ui"), defines, transient=True),
+            "weights": Output("by which each choice stands for others", Texture("rgba32f"), transient=True),
         }
 
     def depends(self) -> frozenset[str]:

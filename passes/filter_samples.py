@@ -54,9 +54,12 @@ class FilterSamples(Pass):
         del inputs
         return {
             "filtered": Output(
-                "irradiance; alpha: standard deviation of its luminance", Texture("rgba32f"), attach=False
+                "irradiance; alpha: standard deviation of its luminance",
+                Texture("rgba32f"),
+                attach=False,
+                transient=True,
             ),
-            "scratch": Output("the same, a step before", Texture("rgba32f"), attach=False),
+            "scratch": Output("the same, a step before", Texture("rgba32f"), attach=False, transient=True),
         }
 
     def depends(self) -> frozenset[str]:

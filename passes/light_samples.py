@@ -32,7 +32,7 @@ class LightSamples(Pass):
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return one texture of the frame's size."""
         del inputs
-        return {"irradiance": Output("irradiance from the VPLs at samples", Texture("rgba32f"))}
+        return {"irradiance": Output("irradiance from the VPLs at samples", Texture("rgba32f"), transient=True)}
 
     def depends(self) -> frozenset[str]:
         """Nothing of the frame."""

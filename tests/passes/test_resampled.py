@@ -39,12 +39,14 @@ def test_the_mean_is_that_of_all_vpls_of_the_pool(renderer, tmp_path, scene, ray
     """Each image against the sum over its own pool, which takes most of the noise away; the near field is left out."""
     settings = {**RAW, **FEW, "choose_vpls.rays": rays, "vpl.candidates": 8, "vpl.clamp": 0.05, "vpl.fov": 150.0}
     graph, size = tmp_path / "graph.toml", (16, 12)
-    graph.write_text('extends = "resampled"\n[outputs]\nnear_field = "near_field.residual"\n')
+    graph.write_text(
+        'extends = "resampled"\n[outputs]\nnear_field = "near_field.residual"\nraw = "light_samples.irradiance"\n'
+    )
     one = renderer(size, graph, set=settings)
     tracer, off, full = Tracer(scene), [], []
     hits = PathTracer(scene, tracer).trace_camera_rays(size)
     for seed in range(160):
-        one.draw(scene, one.plan(scene, 16, ["radiance", "near_field"]), seed=seed)
+        one.draw(scene, one.plan(scene, 16, ["radiance", "near_field", "raw"]), seed=seed)
         records = read_records(one)
         irradiance = read_port(one, "light_samples.irradiance") - read_port(one, "near_field.residual")
         expected = sum_radiance(tracer, hits, read_vpls(records), read_limits(records)).reshape(12, 16, 3)[::-1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -19,7 +20,9 @@ SCENES = ("cornell", "atrium", "colors")
 
 def main() -> None:
     """Measure, print and write."""
-    table = bench.report(SCENES)
+    describe = ["git", "describe", "--always", "--dirty"]
+    commit = subprocess.run(describe, cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
+    table = f"{bench.report(SCENES)} Commit {commit}."
     print(table)
     PAGE.write_text(replace_between(PAGE.read_text(encoding="utf-8"), BEGIN, END, table), encoding="utf-8")
 

@@ -19,6 +19,7 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.pool.proposals import TEXELS
 from deferred_ir.pool.samples import draw_samples, read_layout
 
 
@@ -47,7 +48,7 @@ class ChooseVpls(Pass):
         """Return two textures of the frame's size. Raises GraphError where a list is too short."""
         p, lists = self.params, inputs["lists"]
         assert isinstance(lists, Texture)
-        entries = lists.size[0] // 4 if lists.size else 0
+        entries = lists.size[0] // TEXELS if lists.size else 0
         if p.draws % p.rays or entries % p.draws:
             raise GraphError(
                 f"draws {p.draws}, rays {p.rays} and {entries} entries of a list: each must divide the next; "

@@ -20,14 +20,12 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
-from deferred_ir.pool.proposals import GROUPS, Groups, draw_lists
+from deferred_ir.pool.proposals import GROUPS, TEXELS, Groups, draw_lists
 from deferred_ir.pool.samples import read_layout
 from deferred_ir.sampling import streams
 
 TILES = 16
 """Tiles along an edge of the image, whatever its size."""
-TEXELS = 4
-"""Texels of a VPL in a list: position, power times weight; normal, clamp^2; emission, weight; one that aligns them."""
 NUMBER = np.dtype("u4")
 
 

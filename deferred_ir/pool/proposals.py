@@ -23,6 +23,8 @@ GROUPS = 1024
 """Most groups of a pool: a row of scores for each tile."""
 EVEN = 0.3
 """Fraction of the probability that goes by power alone, whatever a tile's few probes see of a VPL."""
+TEXELS = 4
+"""Texels of a VPL in a list: position, power times weight; normal, clamp^2; emission, weight; one that aligns them."""
 TILES = 16
 """Tiles of a task: few enough for their arrays to stay in a core's cache."""
 BITS = 10

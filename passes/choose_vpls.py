@@ -52,7 +52,7 @@ class ChooseVpls(Pass):
         if p.draws % p.rays or entries % p.draws:
             raise GraphError(
                 f"draws {p.draws}, rays {p.rays} and {entries} entries of a list: each must divide the next; "
-                f"try draws {max(entries // 4, 4)}, rays 4"
+                f"try rays 4, draws 32 and propose_vpls.entries 512"
             )
         defines = {"RAYS": p.rays}
         return {

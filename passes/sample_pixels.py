@@ -13,7 +13,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir.base.arrays import Ints
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.vpl_params import explain_no_vpls
@@ -77,10 +76,14 @@ class SamplePixels(Pass):
         """Find lonely pixels, then gather the samples' surfaces."""
         layout = Layout.of_frame(frame.size, self.params.scale, frame.seed)
         defines = {"SMOOTH": int(frame.smooth)}
-        listed = self._find_lonely(layout, io, defines) if self.params.scale > 1 else np.zeros(0, int)
-        layout = replace(layout, listed=len(listed))
-        if len(listed):
-            _tell_places(io, layout, listed)
+        listed = np.zeros(0, int)
+        if self.params.scale > 1:
+            blend = self._draw_blend(layout, io, defines)
+            listed = np.flatnonzero(blend == LONELY)
+            layout = replace(layout, listed=len(listed))
+            if len(listed):  # lonely pixels are told which texels their samples have
+                blend.reshape(-1)[listed] |= layout.find_list_places().astype(np.uint32)
+                io["blend"].upload(blend)
         write_layout(io, layout)
         io["pixels"].upload(layout.place(listed)[..., None])
         io["pixels"].bind_image(0)
@@ -91,23 +94,16 @@ class SamplePixels(Pass):
         columns, rows = layout.grid
         io.report(SAMPLES.name, columns * rows + len(listed))
 
-    def _find_lonely(self, layout: Layout, io: Io, defines: Mapping[str, int | float]) -> Ints:
-        """Draw `blend`. Returns the numbers of lonely pixels, ascending."""
+    def _draw_blend(self, layout: Layout, io: Io, defines: Mapping[str, int | float]) -> np.ndarray:
+        """Draw `blend` and read it back, uint32 (H, W, 1)."""
         io["blend"].framebuffer.bind()
         program = io.program("sample_pixels/blend.frag", defines=defines)
         cosine = cos(radians(self.params.angle))
         program.set(offset=layout.offset, cosine=cosine, slack=self.params.slack)
         program.draw_fullscreen()
         io["blend"].touch()
-        listed: Ints = np.flatnonzero(io["blend"].read() == LONELY)
-        return listed
-
-
-def _tell_places(io: Io, layout: Layout, listed: Ints) -> None:
-    """Write into `blend` which texels the samples of the pixels `listed` have."""
-    blend = io["blend"].read()
-    blend.reshape(-1)[listed] = LONELY | layout.find_list_places().astype(np.uint32)
-    io["blend"].upload(blend)
+        blend: np.ndarray = io["blend"].read()
+        return blend
 
 
 PASS = SamplePixels

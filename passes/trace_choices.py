@@ -25,7 +25,7 @@ RAYS = Figure("choice_rays", "Shadow rays to the VPLs that samples have chosen."
 
 
 class TraceChoices(Pass):
-    """Which choices are seen."""
+    """Bits that say which of its choices each sample sees."""
 
     figures = (RAYS,)
     inputs: ClassVar[Mapping[str, Input]] = {

@@ -40,11 +40,13 @@ vec3 mean_of_lonely(ivec2 place, Sample s, float off) {
             uint shares = texelFetch(blend, other, 0).r;
             if ((shares & LONELY) == 0u) continue;
             ivec2 at = ivec2(int(shares & ~LONELY) % size.x, int(shares & ~LONELY) / size.x);
-            float weight = on_surface(s, read_sample(positions, sample_normals, at), off) ? 1.0 : 0.0;
+            // The sample itself counts: a rounded normal's cosine to itself may be below 1.
+            bool counts = at == place || on_surface(s, read_sample(positions, sample_normals, at), off);
+            float weight = counts ? 1.0 : 0.0;
             sum += weight * texelFetch(irradiance, at, 0).rgb;
             total += weight;
         }
-    return sum / total;  // the sample itself counts
+    return sum / total;
 }
 #endif
 
@@ -71,7 +73,8 @@ void main() {
         ivec2 step = ivec2(i % 3 - 1, i / 3 - 1), other = place + step * apart, inside = clamp(other, ivec2(0), grid - 1);
         Sample t = read_sample(positions, sample_normals, inside);
         vec4 light = texelFetch(irradiance, inside, 0);
-        float l = luminance(light.rgb), weight = other == inside && on_surface(s, t, off) ? 1.0 : 0.0;
+        bool counts = other == place || (other == inside && on_surface(s, t, off));
+        float l = luminance(light.rgb), weight = counts ? 1.0 : 0.0;
 #if FIRST
         mean += weight * l;
         values[i] = abs(l - level);
@@ -86,7 +89,7 @@ void main() {
         sum += weight * light.rgb;
         total += weight;
     }
-    filtered.rgb = sum / total;  // the sample itself counts
+    filtered.rgb = sum / total;
     float squares = 0.0;  // over those of `most`: squares of light itself may leave the range of floats
     for (int i = 0; i < 9; ++i) {
         float value = weights[i] > 0.0 ? values[i] / most : 0.0;

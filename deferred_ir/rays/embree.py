@@ -124,7 +124,8 @@ def _build_scene(positions: Array, faces: Ints) -> Any:
         from embreex.mesh_construction import TriangleMesh
     except ImportError as error:
         raise DeviceError(
-            "embreex: not installed, so no rays can be traced; pip install embreex, or render with --vpls 0"
+            "embreex: not installed, so no rays can be traced; pip install embreex, "
+            "or render with --graph deferred --vpls 0"
         ) from error
     scene = rtcore_scene.EmbreeScene(robust=True)
     TriangleMesh(scene, positions.astype(np.float32), faces.astype(np.int32))

@@ -1,4 +1,4 @@
-"""Which points of a few each surface sees, by shadow rays, in few passes over arrays that fit a core's cache."""
+"""Find by shadow rays which of a few points each surface sees, in few passes over arrays that fit a core's cache."""
 
 from __future__ import annotations
 

@@ -26,7 +26,8 @@ void main() {
         float e = texelFetch(depth, other, 0).r;
         vec3 way = unproject(centre_ndc(other, size), max(e, d * 1e-3)) - p.position, shading, geometric;
         decode_normals(texelFetch(normals, other, 0), shading, geometric);
-        bool same = e > 0.0 && abs(dot(way, p.normal)) <= off && dot(shading, p.shading_normal) >= cosine;
+        bool like = abs(dot(way, p.normal)) <= off && dot(shading, p.shading_normal) >= cosine;
+        bool same = other == pixel || (e > 0.0 && like);  // a rounded normal's cosine to itself may be below 1
         found = found || same;
         uint share = uint(corner_weight(corner, i) * 126.0 + 1.5);  // a little even of what lies farthest
         blend.r |= same ? share << (7 * i) : 0u;

@@ -192,7 +192,7 @@ def test_a_seed_is_an_image(renderer):
 
 
 @pytest.mark.parametrize(
-    ("settings", "told"), [({"draws": 30, "rays": 4}, "must divide"), ({"draws": 24}, "try draws")]
+    ("settings", "told"), [({"draws": 30, "rays": 4}, "must divide"), ({"draws": 24}, "try rays 4, draws 32")]
 )
 def test_draws_that_do_not_fit_are_refused(renderer, settings, told):
     with pytest.raises(GraphError, match=told):
@@ -256,3 +256,11 @@ def test_what_a_scene_does_not_need_is_left_out(renderer):
     assert "direct_rays" in one.plan(dark, 4).left_out
     assert not one.render(dark, vpls=4).radiance.any()
     assert same_pixels(one.render(room(), vpls=4), full.render(room(), vpls=4))
+
+
+@pytest.mark.parametrize("angle", ["sample_pixels.angle", "filter_samples.angle"])
+def test_a_sample_is_on_its_own_surface_however_narrow_the_angle(renderer, angle):
+    """A rounded normal's cosine to itself may be below 1."""
+    image = renderer((40, 30), "resampled", set={angle: 0.0}).render(smooth_scene(), vpls=8).radiance
+    assert np.isfinite(image).all()
+    assert image.max() > 0

@@ -1,4 +1,4 @@
-"""Which of its chosen points a surface sees, against one ray at a time."""
+"""`find_seen` compared with one ray at a time."""
 
 import numpy as np
 import pytest

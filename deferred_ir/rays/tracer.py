@@ -89,13 +89,13 @@ class Tracer:
         u, v = u.astype(np.float64), v.astype(np.float64)
         return self._hits(face, np.stack([1 - u - v, u, v], axis=-1), np.asarray(directions, np.float64))
 
-    def within(self, origins: Array, directions: Array, reach: float) -> tuple[Ints, Hits]:
-        """Find the rays (n, 3), (n, 3) that hit a surface within `reach` lengths of their directions.
+    def within(self, origins: Array, directions: Array, reach: Array | float) -> tuple[Ints, Hits]:
+        """Find the rays (n, 3), (n, 3) that hit a surface within `reach` lengths of their directions, one or (n,).
 
         Returns the rows of these rays (m,), ascending, and their m closest hits; rays that miss cost little.
         """
         org, dirs = origins.astype(np.float32), directions.astype(np.float32)
-        ends = np.full(len(org), min(reach, INFINITE), np.float32)
+        ends = np.broadcast_to(np.minimum(reach, INFINITE).astype(np.float32), len(org))
         face, u, v = self._first(lambda chunk: self._rays.closest(org[chunk], dirs[chunk], ends[chunk]), len(org))
         rows = np.flatnonzero(face >= 0)
         u, v = u[rows].astype(np.float64), v[rows].astype(np.float64)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from deferred_ir.base.arrays import Array, Ints
+from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.parallel import run_in_order
 from deferred_ir.rays.direct import compute_irradiance
 from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces
@@ -25,6 +25,8 @@ from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.sampling import pixel_blocks, streams
 from deferred_ir.vpls.kernel import VplLimits
 
+NOWHERE = -1.0
+"""Reach of a ray that is not traced."""
 RAYS = 1 << 14
 """Rays of a task: few enough for their arrays to stay in a core's cache."""
 
@@ -50,19 +52,20 @@ def trace_residual(job: PixelJob, limits: VplLimits, *, samples: float, bounces:
     lattice = pixel_blocks.find_lattice(total)
     rays, emission = _Rays(job.tracer, seen, limits, bounces), np.asarray(job.tracer.scene.spotlight.emission, float)
 
-    def work(task: tuple[int, slice]) -> Array:
+    def work(task: tuple[int, slice]) -> tuple[Ints, Array]:
         number, chosen = task
         rng = streams.residual_rays(seed, number)
-        rows = np.repeat(traced[chosen], each)
         points = (pixel_blocks.jitter(index[chosen].reshape(-1), lattice, rng) + shift) % 1
-        irradiance: Array = rays.trace(rows, points, rng).reshape(-1, each, 3).mean(axis=1) * emission
-        return irradiance
+        found, irradiance = rays.trace(traced[chosen], each, points, rng)
+        return seen.pixel[traced[chosen]][found // each], irradiance * (emission * weight / each)
 
+    image[seen.pixel[traced], 3] = weight
     with closing(run_in_order(work, tasks, job.threads)) as results:
-        for (_, chosen), part in zip(tasks, results, strict=True):
-            pixels = seen.pixel[traced[chosen]]
-            image[pixels, :3] = part * weight
-            image[pixels, 3] = weight
+        parts = list(results)
+    if parts:  # a pixel may have several rays
+        pixels, irradiance = (np.concatenate(column) for column in zip(*parts, strict=True))
+        for channel in range(3):
+            image[:, channel] = np.bincount(pixels, irradiance[:, channel], len(image))
     return image.reshape(height, width, 4)
 
 
@@ -75,42 +78,59 @@ class _Rays:
     limits: VplLimits
     bounces: int
 
-    def trace(self, rows: Ints, points: Array, rng: np.random.Generator) -> Array:
-        """Return the irradiance over emission that one ray from each of the surfaces `rows` brings, float64 (n, 3)."""
-        tracer, position, normal = self.tracer, self.seen.position[rows], self.seen.normal[rows]
-        directions, above = _sample_directions(self.seen.shading_normal[rows], normal, points)
-        start = tracer.lift(position[above], normal[above])
-        found, at = tracer.within(start, directions[above], self.limits.clamp + tracer.offset)
-        rays = above[found]
-        way = position[rays] - at.position
+    def trace(self, rows: Ints, each: int, points: Array, rng: np.random.Generator) -> tuple[Ints, Array]:
+        """Trace `each` rays from each of the surfaces `rows` (n,). Few meet a surface that is near.
+
+        points: float32 (n * each, 2), in [0, 1). Returns the numbers of the rays that do, (m,), ascending, and the
+        irradiance over emission that each brings, float64 (m, 3).
+        """
+        tracer, seen = self.tracer, self.seen.rows(rows)
+        surface = np.repeat(np.arange(len(rows)), each)
+        shading = seen.shading_normal.take(surface, axis=0)
+        normal = shading if seen.normal is seen.shading_normal else seen.normal.take(surface, axis=0)
+        directions, above = _sample_directions(shading, normal, points)
+        start = tracer.lift(seen.position, seen.normal).take(surface, axis=0)
+        reach = np.where(above, np.float32(self.limits.clamp + tracer.offset), np.float32(NOWHERE))
+        rays, at = tracer.within(start, directions, reach)
+        way = seen.position[surface[rays]] - at.position
         square = np.einsum("ij,ij->i", way, way)
         leaving = np.einsum("ij,ij->i", way, at.normal) / np.sqrt(np.maximum(square, np.finfo(float).tiny))
-        carried = np.zeros((len(rows), 3))
+        found, carried = rays, np.zeros((len(rays), 3))
+        row: Ints = np.arange(len(rays))
         throughput: Array = at.albedo * self.limits.missing(square, leaving)[:, None]
         for bounce in range(self.bounces):
             if bounce:
-                rays, throughput, at = self._carry_on(rays, throughput, at, rng)
-            carried[rays] += throughput * compute_irradiance(tracer.scene.spotlight, tracer, at, rng)[:, None]
-        return carried
+                row, throughput, at = self._carry_on(row, throughput, at, rng)
+            carried[row] += throughput * compute_irradiance(tracer.scene.spotlight, tracer, at, rng)[:, None]
+        return found, carried
 
-    def _carry_on(self, rays: Ints, throughput: Array, at: Hits, rng: np.random.Generator) -> tuple[Ints, Array, Hits]:
+    def _carry_on(self, row: Ints, throughput: Array, at: Hits, rng: np.random.Generator) -> tuple[Ints, Array, Hits]:
         """Follow rays for another bounce. Returns those that hit something, their throughputs and their hits."""
-        directions, above = _sample_directions(at.shading_normal, at.normal, rng.random((len(rays), 2)))
-        start = self.tracer.lift(at.position[above], at.normal[above])
-        found, landed = self.tracer.within(start, directions[above], np.inf)
-        hit = above[found]
-        return rays[hit], throughput[hit] * landed.albedo, landed
+        directions, above = _sample_directions(at.shading_normal.copy(), at.normal, rng.random((len(row), 2)))
+        start = self.tracer.lift(at.position, at.normal)
+        hit, landed = self.tracer.within(start, directions, np.where(above, np.inf, NOWHERE))
+        return row[hit], throughput[hit] * landed.albedo, landed
 
 
-def _sample_directions(shading_normals: Array, normals: Array, points: Array) -> tuple[Array, Ints]:
-    """Return unit directions, cosine-distributed about shading normals (n, 3), and the rows of those above their face.
+def _sample_directions(shading_normals: Array, normals: Array, points: Array) -> tuple[Array, Bools]:
+    """Return unit directions, cosine-distributed about shading normals (n, 3), and whether each is above its face.
 
     Each is a unit normal plus a point of the unit sphere (Archimedes' map of `points`, (n, 2)), which needs no basis.
+    The array of shading normals is written over.
     """
     height, angle = 1 - 2 * points[:, 0], 2 * np.pi * points[:, 1]
     radius = np.sqrt(np.maximum(1 - height * height, 0))
-    directions = shading_normals + np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
+    parts = radius * np.cos(angle), radius * np.sin(angle), height
+    above = np.ones(len(points), bool)
+    if normals is not shading_normals:
+        cosine = np.einsum("ij,ij->i", normals, shading_normals)
+        for axis, part in enumerate(parts):
+            cosine += normals[:, axis] * part
+        above = cosine > 0
+    directions = shading_normals
+    for axis, part in enumerate(parts):
+        directions[:, axis] += part
     square = np.einsum("ij,ij->i", directions, directions)
-    above = np.flatnonzero((np.einsum("ij,ij->i", directions, normals) > 0) & (square > 0))
+    above &= square > 0
     directions /= np.sqrt(np.maximum(square, np.finfo(directions.dtype).tiny))[:, None]
     return directions, above

@@ -19,7 +19,6 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
-from deferred_ir.pool.proposals import TEXELS
 from deferred_ir.pool.samples import draw_samples, read_layout
 
 
@@ -41,18 +40,19 @@ class ChooseVpls(Pass):
         "positions": Input("where samples are", format="rgba32f"),
         "sample_normals": Input("their normals", format="rgba16"),
         "pixels": Input("their pixels", format="r32ui"),
-        "lists": Input("VPLs for each tile", format="rgba32f"),
+        "list_positions": Input("VPLs for each tile: position, power times weight", format="rgba32f"),
+        "list_normals": Input("normal, clamp^2", format="rgba32f"),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return two textures of the frame's size. Raises GraphError where a list is too short."""
-        p, lists = self.params, inputs["lists"]
+        p, lists = self.params, inputs["list_positions"]
         assert isinstance(lists, Texture)
-        entries = lists.size[0] // TEXELS if lists.size else 0
+        entries = lists.size[0] if lists.size else 0
         if p.draws % p.rays or entries % p.draws:
             raise GraphError(
                 f"draws {p.draws}, rays {p.rays} and {entries} entries of a list: each must divide the next; "
-                f"try rays 4, draws 32 and propose_vpls.entries 512"
+                f"try rays 4, draws 32 and list_vpls.entries 512"
             )
         defines = {"RAYS": p.rays}
         return {

@@ -31,7 +31,7 @@ class TraceChoices(Pass):
     inputs: ClassVar[Mapping[str, Input]] = {
         "choices": Input("places in the lists", format="rgba32ui"),
         "vpls": Input("the pool", format="vpl"),
-        "numbers": Input("numbers in the pool of the VPLs of all lists", format="number"),
+        "numbers": Input("numbers in the pool of the VPLs of all lists", format="r32ui"),
         "positions": Input("where samples are", format="rgba32f"),
         "sample_normals": Input("their normals", format="rgba16"),
     }
@@ -51,7 +51,7 @@ class TraceChoices(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Read back, trace, upload."""
-        (width, height), vpls, numbers = frame.size, io["vpls"].records, io["numbers"].records
+        (width, height), vpls = frame.size, io["vpls"].records
         image = np.zeros(height * width, np.uint32)
         if not len(vpls):
             io["seen"].upload(image.reshape(height, width, 1))
@@ -59,7 +59,7 @@ class TraceChoices(Pass):
         samples, tracer = frame.read_samples(io["positions"], io["sample_normals"]), frame.tracer()
         places = tracer.lift(vpls["position"], vpls["z_axis"])  # off their surfaces, beside which walls may stand
         choices = io["choices"].read().reshape(-1, 4).take(samples.pixel, axis=0)
-        bits, rays = find_seen(tracer, samples, places.take(numbers, axis=0), choices, NOBODY)
+        bits, rays = find_seen(tracer, samples, places.take(io["numbers"].read().reshape(-1), axis=0), choices, NOBODY)
         image[samples.pixel] = bits
         io["seen"].upload(image.reshape(height, width, 1))
         io.count(RAYS.name, rays)

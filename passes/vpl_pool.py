@@ -15,11 +15,13 @@ from deferred_ir.frame.vpl_params import AUTO_CLAMP, VPLS_ALIVE, CastParams
 from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
-from deferred_ir.graph.ports import Description, Output, Texture
-from deferred_ir.pool.proposals import GROUPS, Groups, order_along_curve
+from deferred_ir.graph.ports import Buffer, Description, Output, Texture
+from deferred_ir.pool.proposals import GROUPS, draw_members, order_along_curve, share_power
 from deferred_ir.sampling import streams
 from deferred_ir.vpls.cast import NONE, cast
 
+ROW = 256
+"""VPLs in a row of the texture, as in shaders/lib/pool/pool.glsl."""
 MOST = 1 << 17
 """Rays beyond which a larger pool would cost more than it gains."""
 
@@ -48,12 +50,21 @@ class VplPool(Pass):
     figures = (VPLS_ALIVE,)
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Return a buffer with room for a VPL per ray and bounce, and a texture of groups."""
+        """Return a buffer with room for a VPL per ray and bounce, the same as a texture, and a texture of groups."""
         del inputs
         vpls = describe_output(replace(self.params, count=self.params.pool), self.params.bounces)
         vpls = replace(vpls, defines={**vpls.defines, "POOL_EDGE": self.params.limits(1.0).cosine})
         which = "one VPL of each group, its power that of the group over the pool's: position, power; normal, clamp^2"
-        return {"vpls": vpls, "groups": Output(which, Texture("rgba32f", (GROUPS, 2)), attach=False)}
+        assert isinstance(vpls.description, Buffer)
+        rows = max(-(-vpls.description.records // ROW), 1)
+        what = (
+            "position, power over the pool's; normal, clamp^2; emission, power of the group up to it over the group's"
+        )
+        return {
+            "vpls": vpls,
+            "pool": Output(what, Texture("rgba32f", (3 * ROW, rows)), attach=False),
+            "groups": Output(which, Texture("rgba32f", (GROUPS, 2)), attach=False),
+        }
 
     def state_facts(self, facts: Facts) -> Statements:
         """State whether there may be VPLs, and whether they are clamped."""
@@ -73,21 +84,33 @@ class VplPool(Pass):
         records = pack_vpls(frame.scene, vpls, p, np.zeros(len(vpls), int))
         records = records[order_along_curve(records["position"], records["z_axis"])]
         io["vpls"].write(records)
-        io["groups"].upload(_pack_groups(records, frame.seed))
+        shares, within = share_power(records["emission"] @ LUMINANCE)
+        io["pool"].upload(_pack_pool(records, within, io["pool"].size[1]))
+        io["groups"].upload(
+            _pack_groups(records, shares, draw_members(within, streams.pool_groups(frame.seed).random(len(shares))))
+        )
         io.report(VPLS_ALIVE.name, len(vpls))
 
 
-def _pack_groups(records: np.ndarray, seed: int) -> np.ndarray:
-    """Return the texels (2, GROUPS, 4) of a VPL drawn by power from each group of VPL records (n,)."""
-    texels = np.zeros((2, GROUPS, 4), np.float32)
-    groups = Groups.of_power(records["emission"] @ LUMINANCE)
-    power = groups.power
-    if power.sum() > 0:
-        number = np.arange(len(power))
-        member, _ = groups.draw_members(number, streams.pool_groups(seed).random(len(power)))
-        drawn = records[member]
-        texels[0, number, :3], texels[1, number, :3] = drawn["position"], drawn["z_axis"]
-        texels[0, number, 3], texels[1, number, 3] = power / power.sum(), drawn["clamp_squared"]
+def _pack_pool(records: np.ndarray, within: np.ndarray, rows: int) -> np.ndarray:
+    """Return the texels (rows, 3 * ROW, 4) of VPL records (n,), as shaders/lib/pool/pool.glsl reads them.
+
+    within: (n,), the part of its group's power that each has with those before it.
+    """
+    texels = np.zeros((rows * ROW, 3, 4), np.float32)
+    pool, power = texels[: len(records)], records["emission"] @ LUMINANCE
+    for texel, name in enumerate(("position", "z_axis", "emission")):
+        pool[:, texel, :3] = records[name]
+    pool[:, 0, 3] = power / max(float(power.sum(dtype=float)), np.finfo(float).tiny)
+    pool[:, 1, 3], pool[:, 2, 3] = records["clamp_squared"], within
+    return texels.reshape(rows, 3 * ROW, 4)
+
+
+def _pack_groups(records: np.ndarray, shares: np.ndarray, drawn: np.ndarray) -> np.ndarray:
+    """Return the texels (2, GROUPS, 4) of one VPL `drawn` (g,) from each group; shares: (g,) of the pool's power."""
+    texels, chosen = np.zeros((2, GROUPS, 4), np.float32), records[drawn]
+    texels[0, : len(drawn), :3], texels[1, : len(drawn), :3] = chosen["position"], chosen["z_axis"]
+    texels[0, : len(drawn), 3], texels[1, : len(drawn), 3] = shares, chosen["clamp_squared"]
     return texels
 
 

@@ -7,7 +7,8 @@
 layout(binding = UNIT_POSITIONS) uniform sampler2D positions;
 layout(binding = UNIT_SAMPLE_NORMALS) uniform sampler2D sample_normals;
 layout(binding = UNIT_PIXELS) uniform usampler2D pixels;
-layout(binding = UNIT_LISTS) uniform sampler2D lists;
+layout(binding = UNIT_LIST_POSITIONS) uniform sampler2D list_positions;
+layout(binding = UNIT_LIST_NORMALS) uniform sampler2D list_normals;
 uniform int frame_seed;
 uniform float area;  // makes the kernel a number without unit
 
@@ -44,7 +45,7 @@ void main() {
         int choice = 0;
         for (int j = 0; j < EACH; ++j) {
             int candidate = start + (k * EACH + j) * STRIDE;
-            Entry entry = read_entry(lists, tile, candidate);
+            Entry entry = read_entry(list_positions, list_normals, tile, candidate);
             float brings = entry.power * entry_kernel(entry, s.position, s.normal, s.shading_normal) * area;
             sum += brings;
             float chance = brings / max(sum, TINY);

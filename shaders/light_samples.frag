@@ -4,7 +4,9 @@
 
 layout(binding = UNIT_POSITIONS) uniform sampler2D positions;
 layout(binding = UNIT_SAMPLE_NORMALS) uniform sampler2D sample_normals;
-layout(binding = UNIT_LISTS) uniform sampler2D lists;
+layout(binding = UNIT_LIST_POSITIONS) uniform sampler2D list_positions;
+layout(binding = UNIT_LIST_NORMALS) uniform sampler2D list_normals;
+layout(binding = UNIT_LIST_EMISSIONS) uniform sampler2D list_emissions;  // times weight
 layout(binding = UNIT_CHOICES) uniform usampler2D choices;
 layout(binding = UNIT_WEIGHTS) uniform sampler2D weights;
 layout(binding = UNIT_SEEN) uniform usampler2D seen;
@@ -25,8 +27,8 @@ void main() {
     for (int k = 0; k < RAYS; ++k) {
         if ((bits >> k & 1u) == 0u) continue;
         int tile = int(chosen[k] / uint(LIST_ENTRIES)), number = int(chosen[k] % uint(LIST_ENTRIES));
-        float kernel = entry_kernel(read_entry(lists, tile, number), s.position, s.normal, s.shading_normal);
-        irradiance.rgb += read_emission(lists, tile, number) * (weight[k] * kernel);
+        float kernel = entry_kernel(read_entry(list_positions, list_normals, tile, number), s.position, s.normal, s.shading_normal);
+        irradiance.rgb += texelFetch(list_emissions, ivec2(number, tile), 0).rgb * (weight[k] * kernel);
     }
 #if HAS_NEAR_FIELD
     irradiance.rgb += texelFetch(near_field, place, 0).rgb;

@@ -152,7 +152,7 @@ def cases(extra: list[str]) -> Iterator[Case]:
         yield Case("cornell", graph, {"interleave.n": 8}, seeds=(0, 1, 1), reuse=True)
     for scale in (1, 3, 4):
         yield Case("soft", "resampled", {"sample_pixels.scale": scale, "vpl.bounces": 2}, seeds=(0, 1, 1), reuse=True)
-    yield Case("cornell", "resampled", {"choose_vpls.rays": 1, "filter_samples.steps": 0, "propose_vpls.entries": 64})
+    yield Case("cornell", "resampled", {"choose_vpls.rays": 1, "filter_samples.steps": 0, "list_vpls.entries": 64})
     for visibility in ("maps", "rays"):
         yield Case("soft", "accurate", {"shadow_rays.visibility": visibility}, seeds=(0, 1, 1))
         yield Case("cornell", "accurate", {"shadow_rays.visibility": visibility, "near_field.samples": 0.5})

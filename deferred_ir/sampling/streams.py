@@ -59,8 +59,8 @@ def pool_groups(seed: int) -> Stream:
     return np.random.default_rng([seed, 1, 2])
 
 
-def pool_lists(seed: int) -> Stream:
-    """Return the stream that draws the lists of VPLs of an image's tiles."""
+def pool_probes(seed: int) -> Stream:
+    """Return the stream that places the samples at which an image's tiles score VPLs."""
     return np.random.default_rng([seed, 2, 2])
 
 

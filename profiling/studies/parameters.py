@@ -37,7 +37,7 @@ TABLES = "samples", "clamp", "candidates", "visibility"
 RESAMPLED: Mapping[str, tuple[str, Sequence[int]]] = {
     "scale": ("sample_pixels.scale", (1, 2, 3, 4)),
     "pool": ("vpl.candidates", (4, 16, 64, 256)),
-    "entries": ("propose_vpls.entries", (128, 256, 512, 1024)),
+    "entries": ("list_vpls.entries", (128, 256, 512, 1024)),
     "draws": ("choose_vpls.draws", (8, 16, 32, 64, 128)),
     "rays": ("choose_vpls.rays", (1, 2, 4)),
     "steps": ("filter_samples.steps", (0, 1, 2, 3, 4)),
@@ -48,7 +48,7 @@ PASS = {
     "candidates": "vpl",
     "scale": "sample_pixels",
     "pool": "vpl",
-    "entries": "propose_vpls",
+    "entries": "list_vpls",
     "draws": "choose_vpls",
     "rays": "trace_choices",
     "steps": "filter_samples",

@@ -18,7 +18,7 @@ from deferred_ir.truth.path_tracer import PathTracer
 from deferred_ir.vpls.ray_sum import sum_radiance
 
 RAW = {"sample_pixels.scale": 1, "filter_samples.steps": 0, "near_field.samples": 1.0}
-FEW = {"propose_vpls.entries": 64, "choose_vpls.draws": 16}
+FEW = {"list_vpls.entries": 64, "choose_vpls.draws": 16}
 
 
 def read_port(one, port):
@@ -60,6 +60,36 @@ def test_the_mean_is_that_of_all_vpls_of_the_pool(renderer, tmp_path, scene, ray
     whole = off.mean(axis=(1, 2, 3)) / mean.mean()
     assert abs(whole.mean()) < 4 * whole.std() / np.sqrt(len(whole)) + 1e-4
     assert whole.std() / np.sqrt(len(whole)) < 0.015
+
+
+@pytest.mark.parametrize("vpls", [1, 40, 3000])
+def test_lists_hold_each_vpl_as_often_as_its_weight_says(renderer, vpls):
+    """The groups of a list are drawn systematically, by their chances; the sum over a list is the pool's."""
+    one = renderer((32, 24), "resampled", set={"vpl.candidates": 1, "list_vpls.entries": 64})
+    sums, features = [], np.random.default_rng(0).random(vpls)
+    for seed in range(12):
+        one.render(room(), vpls=vpls, seed=seed)
+        records = read_records(one)
+        count, groups = len(records), min(len(records), 1024)
+        numbers = read_port(one, "list_vpls.numbers")[..., 0].astype(int)
+        pool = read_port(one, "vpl.pool").reshape(-1, 3, 4)[:count]
+        assert (numbers < count).all()
+        assert (np.diff(numbers, axis=1) >= -(count // groups)).all()  # along the curve, group by group
+        listed = read_port(one, "list_vpls.list_positions")
+        np.testing.assert_array_equal(listed[..., :3], pool[numbers, 0, :3])
+        np.testing.assert_array_equal(read_port(one, "list_vpls.list_normals"), pool[numbers, 1])
+        weight = listed[..., 3] / pool[numbers, 0, 3]
+        np.testing.assert_allclose(
+            read_port(one, "list_vpls.list_emissions")[..., :3], weight[..., None] * pool[numbers, 2, :3], rtol=1e-5
+        )
+        chances = np.diff(read_port(one, "propose_vpls.chances")[:, :groups, 0].astype(float), axis=1, prepend=0)
+        group = np.searchsorted(np.arange(groups + 1) * count // groups, numbers, side="right") - 1
+        drawn = np.stack([np.bincount(row, minlength=groups) for row in group])
+        assert np.abs(drawn - 64 * chances).max() < 1 + 1e-3
+        sums.append((weight * features[numbers]).sum(axis=1) / features[:count].sum())
+    sums = np.array(sums)
+    error = sums.mean(axis=1).std() / np.sqrt(len(sums))
+    assert abs(sums.mean() - 1) < 4.5 * error + 1e-5
 
 
 def test_it_shows_what_accurate_shows(renderer):

@@ -1,4 +1,4 @@
-"""Lists of VPLs for tiles: every VPL stands in them as often as its weight says."""
+"""Chances of the groups of a pool in tiles, and the power of VPLs within their groups."""
 
 import numpy as np
 import pytest
@@ -6,68 +6,85 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from deferred_ir.pool import proposals
-from deferred_ir.pool.proposals import EVEN, Groups, draw_lists, order_along_curve
+from deferred_ir.pool.proposals import (
+    EVEN,
+    add_up_chances,
+    count_groups,
+    draw_members,
+    order_along_curve,
+    share_power,
+)
 
 
-def sums(found, weight, count):
-    """How often each VPL is in each list, by its weight, (t, count)."""
-    total = np.zeros((len(found), count))
-    for tile, (members, weights) in enumerate(zip(found, weight, strict=True)):
-        np.add.at(total[tile], members, weights)
-    return total
+def make_power(rng, count):
+    power = rng.random(count) ** 4
+    power[::7] = 0
+    power[-1] = 1
+    return power
+
+
+@given(st.integers(1, 300), st.integers(1, 40), st.integers(0, 1000))
+def test_shares_and_parts_give_each_vpl_its_power(vpls, groups, seed):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(proposals, "GROUPS", groups)
+        power = make_power(np.random.default_rng(seed), vpls)
+        shares, within = share_power(power)
+        groups = count_groups(vpls)
+    starts = np.arange(groups + 1) * vpls // groups
+    assert shares.sum() == pytest.approx(1)
+    for share, first, last in zip(shares, starts, starts[1:], strict=False):
+        parts = np.diff(within[first:last], prepend=0)
+        np.testing.assert_allclose(share * parts, power[first:last] / power.sum(), atol=1e-12)
+        assert within[last - 1] == (1 if share > 0 else 0)  # exactly: the shader looks for it
+
+
+@given(st.integers(1, 60), st.integers(1, 20), st.integers(0, 1000))
+def test_a_member_is_of_its_group_and_shines(vpls, groups, seed):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(proposals, "GROUPS", groups)
+        rng = np.random.default_rng(seed)
+        power = make_power(rng, vpls)
+        shares, within = share_power(power)
+        drawn = draw_members(within, rng.choice([0.0, 0.5, 1 - 1e-16], len(shares)))
+    starts = np.arange(len(shares) + 1) * vpls // len(shares)
+    assert ((drawn >= starts[:-1]) & (drawn < starts[1:])).all()
+    assert (power[drawn] > 0)[shares > 0].all()
+
+
+def test_members_are_drawn_by_power(monkeypatch):
+    monkeypatch.setattr(proposals, "GROUPS", 2)
+    power = np.array([1.0, 0.0, 3.0, 2.0, 2.0, 0.0])
+    _, within = share_power(power)
+    rng = np.random.default_rng(3)
+    drawn = np.concatenate([draw_members(within, rng.random(2)) for _ in range(4000)])
+    np.testing.assert_allclose(np.bincount(drawn, minlength=6) / 4000, [0.25, 0, 0.75, 0.5, 0.5, 0], atol=0.03)
 
 
 @pytest.mark.parametrize("scores", ["none", "even", "one", "wild"])
-@pytest.mark.parametrize(("vpls", "groups"), [(40, 8), (5, 8), (1, 1)])
-def test_in_the_mean_each_vpl_counts_once(monkeypatch, scores, vpls, groups):
-    monkeypatch.setattr(proposals, "GROUPS", groups)
+def test_chances_are_those_of_power_and_scores(scores):
     rng = np.random.default_rng(1)
-    power = rng.random(vpls) + 0.1
-    power[::7] = 0
-    power[-1] = 1
-    parted = Groups.of_power(power)
-    shape = (3, len(parted.power))
+    shares, _ = share_power(make_power(rng, 40))
     scored = {
-        "none": np.zeros(shape),
-        "even": np.ones(shape),
-        "one": np.eye(*shape),
-        "wild": rng.random(shape) ** 8 * 1e20,
+        "none": np.zeros((3, 40)),
+        "even": np.ones((3, 40)),
+        "one": np.eye(3, 40),
+        "wild": rng.random((3, 40)) ** 8 * 1e20,
     }[scores].astype(np.float32)
-    runs = np.array([sums(*draw_lists(scored, parted, 16, rng), vpls) for _ in range(3000)])
-    error = runs.std(axis=0) / np.sqrt(len(runs))
-    alive = power > 0
-    assert (np.abs(runs.mean(axis=0) - 1) <= 4.5 * error + 1e-6)[:, alive].all()
-    assert (runs[..., ~alive] == 0).all()
+    chances = np.diff(add_up_chances(scored, shares).astype(float), axis=1, prepend=0)
+    expected = np.tile(shares, (3, 1))
+    if scores != "none":
+        expected = EVEN * shares + (1 - EVEN) * scored / scored.sum(axis=1, keepdims=True, dtype=float)
+    np.testing.assert_allclose(chances, expected, atol=3e-7)
+    assert (add_up_chances(scored, shares)[:, -1] == 1).all()  # exactly: the shader looks for it
 
 
-@given(st.integers(1, 300), st.integers(1, 64), st.integers(0, 1000))
-def test_no_group_is_in_a_list_more_than_once_beyond_its_part(vpls, entries, seed):
-    rng = np.random.default_rng(seed)
-    parted = Groups.of_power(rng.random(vpls) + 0.01)
-    scores = rng.random((2, vpls)).astype(np.float32)
-    found, _ = draw_lists(scores, parted, entries, rng)
-    chance = (1 - EVEN) * scores / scores.sum(axis=1, keepdims=True) + EVEN * parted.power / parted.power.sum()
-    for tile in range(2):
-        drawn = np.bincount(found[tile], minlength=vpls)
-        assert np.abs(drawn - entries * chance[tile]).max() < 1 + 1e-3
-        assert (np.diff(found[tile]) >= 0).all()  # along the curve
-
-
-def test_no_weight_exceeds_what_power_alone_allows():
-    """A VPL that the probes of a tile do not see can light the tile: its weight must stay finite, and small."""
-    parted = Groups.of_power(np.ones(64))
-    scores = np.zeros((1, 64), np.float32)
-    scores[0, 0] = 1
-    _, weight = draw_lists(scores, parted, 32, np.random.default_rng(0))
-    assert weight.max() <= 64 / (32 * EVEN) * (1 + 1e-5)
-
-
-@pytest.mark.parametrize("power", [np.zeros(0), np.zeros(9)])
-def test_without_power_lists_hold_nobody(power):
-    parted = Groups.of_power(power)
-    found, weight = draw_lists(np.zeros((2, len(parted.power)), np.float32), parted, 4, np.random.default_rng(0))
-    assert found.shape == weight.shape == (2, 4)
-    assert not weight.any()
+@pytest.mark.parametrize("count", [0, 9])
+def test_without_power_there_are_no_chances(count):
+    shares, within = share_power(np.zeros(count))
+    chances = add_up_chances(np.zeros((2, count), np.float32), shares) if count else np.zeros(0)
+    assert not shares.any()
+    assert not within.any()
+    assert not chances.any()
 
 
 @given(st.integers(0, 200), st.floats(1e-20, 1e20))

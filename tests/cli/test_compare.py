@@ -35,7 +35,7 @@ def test_the_table_the_json_and_the_picture(pair, tmp_path, capsys):
     assert main(["compare", *pair, "--json", str(tmp_path / "f.json"), "--diff", str(tmp_path / "d.png")]) == 0
     output = capsys.readouterr()
     rows = [line.split("  ")[0] for line in output.out.splitlines()]
-    assert rows == ["relMSE (trimmed)", "relMSE (whole)", "RMSE", "bias", "FLIP"]
+    assert rows == ["relMSE (trimmed)", "relMSE (whole)", "reference noise", "RMSE", "bias", "FLIP"]
     assert "-10.000 %" in output.out
     assert "not checked" in output.err  # bare arrays are taken, with a note
     figures = json.loads((tmp_path / "f.json").read_text())
@@ -210,6 +210,28 @@ def test_without_flip_the_line_says_why(pair, capsys, monkeypatch):
     line = capsys.readouterr().out.splitlines()[-1]
     assert line.startswith("FLIP")
     assert line.endswith("pip install 'deferred-ir[report]'")
+
+
+def test_the_noise_of_the_reference_is_told_and_no_error_below_it_is_quoted(pair, tmp_path, capsys):
+    """The image is a tenth darker everywhere, so the relMSE is a little below 0.01."""
+    figures = {}
+    for noise in (0.0002, 0.002, 0.008, None):
+        (tmp_path / "b.json").write_text(json.dumps(METADATA | {"noise": noise, "spp": 64}))
+        assert main(["compare", *pair, "--json", str(tmp_path / "f.json")]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        figures[noise] = [" ".join(line.split()) for line in lines[:3]], json.loads((tmp_path / "f.json").read_text())
+    told = {noise: json_file["flagged"] for noise, (_, json_file) in figures.items()}
+    assert told == {0.0002: "", 0.002: "reference_noise", 0.008: "below_noise", None: "reference_noise"}
+    how = "from the spread of its 64 paths a pixel"
+    assert figures[0.0002][1]["reference_noise"] == {"relmse": 0.0002, "how": how}
+    relmse = figures[0.0002][1]["relmse"]
+    assert figures[0.0002][0][0].startswith(f"relMSE (trimmed) {relmse:.4g} without")
+    assert figures[0.0002][0][2] == f"reference noise 0.0002 its own relMSE, {how}"
+    assert figures[0.002][0][0].endswith(f"{0.002 / relmse:.0%} of it is the reference's noise")
+    assert figures[0.008][0][0].startswith("relMSE (trimmed) < 0.008 ")
+    assert f"{relmse:.4g} was measured, most of it the reference's noise" in figures[0.008][0][0]
+    assert figures[0.008][1]["relmse"] == relmse
+    assert figures[None][0][2].startswith("reference noise - unknown")
 
 
 @pytest.mark.parametrize("width", [1, 32, 300])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from deferred_ir.cli.options import print_notes
 if TYPE_CHECKING:
     from deferred_ir.base.arrays import Array
     from deferred_ir.truth.metrics import Comparison
+    from deferred_ir.truth.reference_noise import ReferenceNoise
 
 HELP = "Measure how far an image is from its reference: relMSE, RMSE, bias, FLIP."
 ORDER = 30
@@ -36,6 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     from deferred_ir.base.files import write_json
     from deferred_ir.truth import error_picture
     from deferred_ir.truth.metrics import compare
+    from deferred_ir.truth.reference_noise import ReferenceNoise
 
     image_path, reference_path = Path(arguments.image), Path(arguments.reference)
     json = Path(arguments.json) if arguments.json else None
@@ -46,14 +48,16 @@ def run(arguments: argparse.Namespace) -> int:
     _check_same_time(image, reference)
     hit = reference.metadata.get("hit_fraction") or None
     result = compare(image.radiance, reference.radiance, hit, names=(str(image_path), str(reference_path)))
+    noise = ReferenceNoise.from_metadata(reference.metadata)
     print_notes(_list_notes(result, image, reference))
     if diff:
         error = error_picture.measure_signed_errors(image.radiance, reference.radiance, result.reference_mean)
         error_picture.save(diff, error)
     if json:
         names = {"image": str(image_path), "reference": str(reference_path)}
-        write_json(json, {**names, "scene_hash": reference.metadata.get("scene_hash"), **result.as_dict()})
-    print(format_table(result))
+        told = {"reference_noise": asdict(noise), "flagged": noise.flag(result.relmse)}
+        write_json(json, {**names, "scene_hash": reference.metadata.get("scene_hash"), **result.as_dict(), **told})
+    print(format_table(result, noise))
     return 0
 
 
@@ -74,12 +78,14 @@ def _read(path: Path) -> _Input:
     return _Input(path, radiance, read_metadata(path, (radiance.shape[1], radiance.shape[0])))
 
 
-def format_table(result: Comparison) -> str:
+def format_table(result: Comparison, noise: ReferenceNoise) -> str:
     """Lay out the figures in lines of name, value and what they rest on."""
     left_out = f"without the worst {result.trimmed_pixels} of {result.pixels} pixels"
+    own = "-" if noise.relmse is None else f"{noise.relmse:.4g}"
     rows = [
-        ("relMSE (trimmed)", f"{result.relmse:.4g}", left_out),
-        ("relMSE (whole)", f"{result.relmse_untrimmed:.4g}", ""),
+        _make_row("relMSE (trimmed)", result.relmse, noise, left_out),
+        _make_row("relMSE (whole)", result.relmse_untrimmed, noise),
+        ("reference noise", own, f"{'unknown: ' if noise.relmse is None else 'its own relMSE, '}{noise.how}"),
         ("RMSE", f"{result.rmse:.4g}", f"the reference's mean is {result.reference_mean:.4g}"),
         ("bias", f"{100 * result.bias:+.3f} %", "mean(I - R) / mean(R)"),
     ]
@@ -91,6 +97,16 @@ def format_table(result: Comparison) -> str:
         rows.append(("FLIP", f"{result.flip:.4g}", exposures))
     width = max(len(value) for _, value, _ in rows)
     return "\n".join(f"{name:<16}  {value:>{width}}  {remark}".rstrip() for name, value, remark in rows)
+
+
+def _make_row(name: str, error: float, noise: ReferenceNoise, remark: str = "") -> tuple[str, str, str]:
+    """Return a row for a relMSE, and how much of it is the reference's noise where that is not little."""
+    remarks = [remark] if remark else []
+    if noise.hides(error):
+        remarks.append(f"{error:.4g} was measured, most of it the reference's noise")
+    elif noise.relmse is not None and noise.flag(error):
+        remarks.append(f"{noise.relmse / error:.0%} of it is the reference's noise")
+    return name, noise.quote(error, 4), "; ".join(remarks)
 
 
 def _check_outputs(image: Path, reference: Path, json: Path | None, diff: Path | None) -> None:

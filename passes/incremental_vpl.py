@@ -51,6 +51,7 @@ class IncrementalVpl(Pass):
     Params = Params
     figures = (VPLS_ALIVE, VPLS_WAITING)
     State = State
+    retains_samples = True
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """One buffer with room for a VPL for each ray."""

@@ -62,3 +62,8 @@ class Plan:
     def frames_to_fill(self) -> int:
         """Frames of a still scene until the image is complete; 1 where no pass keeps anything between frames."""
         return max((step.work.frames_to_fill() for step in self.steps), default=1)
+
+    @property
+    def retains_samples(self) -> bool:
+        """Whether an image holds samples of earlier frames, so that the time of a frame is not what it took."""
+        return any(step.work.retains_samples for step in self.steps)

@@ -29,6 +29,8 @@ class Pass:
     """
     figures: ClassVar[Sequence[Figure]] = ()
     """Figures that the pass publishes, and where RUN.json has them."""
+    retains_samples: ClassVar[bool] = False
+    """Whether outputs hold samples of earlier frames: then the time of a frame is not what its image took."""
     shader_folder: ClassVar[Path | None] = None
     """Folder of a user's shaders, searched before the package's own."""
 

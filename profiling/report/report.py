@@ -39,7 +39,7 @@ class _Figures:
     compared: Sequence[Group]
     rungs: Sequence[Rung]
     equal: Sequence[Row]
-    stateful: Mapping[str, int]
+    retaining: Mapping[str, int]
 
 
 def write_all(folder: Path, results: Results) -> str:
@@ -72,7 +72,7 @@ def _compute(results: Results) -> _Figures:
     rungs = equal_error.group_rungs(results.peers.points)
     compared = group_points(results.points, masked=True) if rungs else groups
     equal = equal_error.rows(compared, rungs, results.points[0].reference_noise)
-    return _Figures(groups, compared, rungs, equal, equal_error.find_stateful(compared))
+    return _Figures(groups, compared, rungs, equal, equal_error.find_retaining(groups))
 
 
 def _describe(results: Results) -> dict[str, Any]:
@@ -115,7 +115,7 @@ def _render_page(
         groups=figures.groups,
         rungs=figures.rungs,
         equal=figures.equal,
-        stateful=figures.stateful,
+        retaining=figures.retaining,
         notes=results.peers.notes,
     )
 

@@ -1,7 +1,7 @@
 """The time that renderers need for the same error, interpolated between measured points and never extrapolated.
 
-Graphs that fill state over several frames are left out: their frame times are those of a filled set, and a single image
-would take all the frames before as well.
+Graphs that retain samples of earlier frames are left out: their frame times are those of a filled set, and a single
+image would take all the frames before as well.
 """
 
 from __future__ import annotations
@@ -120,11 +120,11 @@ def reach(name: str, choices: Iterable[tuple[float, float]], target: float) -> R
     return Reach(name, ms, at_most, floor, beyond)
 
 
-def find_stateful(groups: Iterable[Group]) -> dict[str, int]:
-    """Return the graphs that take more than one frame to fill their state, and how many they take at most."""
+def find_retaining(groups: Iterable[Group]) -> dict[str, int]:
+    """Return the graphs that retain samples of earlier frames, and how many frames fill their state at most."""
     fills: dict[str, int] = {}
     for group in groups:
-        if group.frames_to_fill > 1:
+        if group.retains_samples:
             fills[group.graph] = max(group.frames_to_fill, fills.get(group.graph, 1))
     return fills
 
@@ -134,9 +134,8 @@ def rows(
 ) -> list[Row]:
     """Return the table, empty without peers. groups: with masked errors. noise: the reference's own relMSE."""
     ours: dict[str, list[tuple[float, float]]] = {}
-    stateful = find_stateful(groups)
     for group in groups:
-        if group.graph in stateful:
+        if group.retains_samples:
             continue
         ours.setdefault(group.graph, []).append((group.frame_ms, group.relmse))
     theirs: dict[str, list[tuple[float, float]]] = {}

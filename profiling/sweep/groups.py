@@ -1,4 +1,8 @@
-"""Points of a sweep grouped by graph and number of VPLs, the Pareto front, and a recommendation."""
+"""Points of a sweep grouped by graph and number of VPLs, the Pareto front, and a recommendation.
+
+Graphs that retain samples of earlier frames are neither on the front nor recommended: the time of one of their frames
+is not what its image took.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +24,7 @@ class Group:
     """All seeds of a graph and a number of VPLs: means, and the smallest and largest relMSE. Times in milliseconds.
 
     frames_to_fill: frames before the measured ones in which the graph fills its state; 1 without state.
+    retains_samples: whether images hold samples of earlier frames.
     """
 
     graph: str
@@ -31,6 +36,7 @@ class Group:
     relmse_high: float
     flagged: bool
     frames_to_fill: int = 1
+    retains_samples: bool = False
     pareto: bool = False
 
 
@@ -55,7 +61,9 @@ def group_points(points: Iterable[Point], *, masked: bool = False) -> list[Group
         if error is not None:
             seeds.setdefault((point.graph, point.key.vpls), []).append((point, error))
     groups = [_make_group(graph, vpls, members) for (graph, vpls), members in seeds.items()]
-    return [replace(group, pareto=not any(_beats(other, group) for other in groups)) for group in groups]
+    front = [group for group in groups if not group.retains_samples]
+    front = [group for group in front if not any(_beats(other, group) for other in front)]
+    return [replace(group, pareto=group in front) for group in groups]
 
 
 def _make_group(graph: str, vpls: int, members: Sequence[tuple[Point, float]]) -> Group:
@@ -70,6 +78,7 @@ def _make_group(graph: str, vpls: int, members: Sequence[tuple[Point, float]]) -
         relmse_high=max(errors),
         flagged=any(is_noisy(point.reference_noise, error) for point, error in members),
         frames_to_fill=max(point.frames_to_fill for point, _ in members),
+        retains_samples=any(point.retains_samples for point, _ in members),
     )
 
 
@@ -85,6 +94,9 @@ def _beats(other: Group, group: Group) -> bool:
 
 def advise(groups: Sequence[Group], budget: float = BUDGET) -> str:
     """Return a sentence that recommends a graph and a number of VPLs for `budget` milliseconds a frame."""
+    groups = [group for group in groups if not group.retains_samples]
+    if not groups:
+        return "No recommendation: the time of a frame that retains samples of earlier ones is not that of an image."
     within = [group for group in groups if group.frame_ms <= budget]
     if within:
         least = min(group.relmse for group in within)

@@ -61,6 +61,7 @@ def measure(setup: Setup, renderer: Renderer, graph: str, key: Key) -> Point:
         software=renderer.gpu.device.kind == "software",
         vpls_alive=alive,
         frames_to_fill=plan.frames_to_fill,
+        retains_samples=plan.retains_samples,
         frames=[round(ms, 4) for ms in measured.frame_ms],
         laps=[[(name, round(gpu, 4), round(cpu, 4)) for name, (gpu, cpu) in laps.items()] for laps in measured.laps],
         memory=memory,

@@ -47,7 +47,8 @@ class Point:
 
     reference: hash of the reference image. reference_noise: the reference's own relMSE, None if unknown. device:
     GL_RENDERER. software: whether that is a driver without a GPU. frames_to_fill: frames until state between frames is
-    complete, before the measured frames; 1 for graphs without such state. frames: wall time of each measured frame.
+    complete, before the measured frames; 1 for graphs without such state. retains_samples: whether images hold samples
+    of earlier frames, so that the time of a frame is not that of an image. frames: wall time of each measured frame.
     laps: for each frame (pass, GPU, CPU) in the order in which the passes ran. relmse_masked: relMSE of the pixels
     without an edge, None if there is no such pixel. time: of the last frame, where something moves, seconds. pictures:
     whether the files of PICTURES lie beside the point.
@@ -62,6 +63,7 @@ class Point:
     software: bool
     vpls_alive: int
     frames_to_fill: int
+    retains_samples: bool
     frames: list[float]
     laps: list[list[tuple[str, float, float]]]
     memory: dict[str, int]

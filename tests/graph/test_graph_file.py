@@ -443,3 +443,11 @@ GRAPH_FILES = {path.stem: path for folder in FOLDERS for path in sorted(folder.r
 def test_every_graph_file_of_the_package_compiles(name):
     graph = load_graph(GRAPH_FILES[name], passes={**visibility.PASSES, **LIMITS, **tessellation.PASSES})
     assert compile(graph, list(graph.outputs)).steps
+
+
+@pytest.mark.parametrize("name", graph_names())
+def test_what_fills_over_frames_says_that_it_retains_samples(name):
+    for node in load_graph(name).nodes.values():
+        fills = type(node.work).frames_to_fill is not Pass.frames_to_fill
+        assert node.work.retains_samples == fills, node.name
+        assert node.work.State is not None or not fills

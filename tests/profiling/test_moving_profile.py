@@ -11,7 +11,7 @@ import pytest
 from deferred_ir import load
 from deferred_ir.cli import main
 from deferred_ir.engine.renderer import Renderer
-from deferred_ir.profiling.sweep import sweep
+from deferred_ir.profiling.sweep import groups, sweep
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.reference import trace_reference
@@ -116,6 +116,18 @@ def test_a_sweep_moves_and_its_errors_are_of_the_last_frame(scene_file, swept):
                 assert len(times) == 2 + sweep.FRAMES
     page = (swept / "report.html").read_text()
     assert "end at 0.4 s" in page
+    assert "incremental retains samples" in page
+
+
+def test_what_retains_samples_is_neither_on_the_front_nor_recommended(scene_file, swept, capsys):
+    assert profiled(scene_file, swept, "--time", "0.4") == 0
+    assert "deferred, 12 VPLs" in capsys.readouterr().out  # though a frame of incremental may take less
+    told = {group["graph"]: group for group in json.loads((swept / "error_vs_time.json").read_text())["groups"]}
+    assert (told["incremental"]["retains_samples"], told["incremental"]["pareto"]) == (True, False)
+    assert (told["deferred"]["retains_samples"], told["deferred"]["pareto"]) == (False, True)
+    assert "No recommendation" in groups.advise(
+        [groups.Group("a", 8, 1, 1, 0.1, 0.1, 0.1, False, retains_samples=True)]
+    )
 
 
 def test_a_sweep_takes_a_reference_of_its_time_only(scene_file, swept, tmp_path, capsys):

@@ -348,13 +348,13 @@ def group(graph, vpls, ms, error):
     return groups.Group(graph, vpls, 1, ms, error, error, error, False)
 
 
-def test_graphs_that_fill_state_over_frames_are_left_out():
-    filled = replace(group("incremental", 16, 1, 0.001), frames_to_fill=2)
-    ours = [group("incremental", 8, 1, 0.05), filled, group("a", 4, 100, 0.02)]
+def test_graphs_that_retain_samples_are_left_out():
+    filled = replace(group("incremental", 16, 1, 0.001), frames_to_fill=2, retains_samples=True)
+    ours = [replace(group("incremental", 8, 1, 0.05), retains_samples=True), filled, group("a", 4, 100, 0.02)]
     theirs = [rung(1, 100, 0.2), rung(2, 1000, 0.02)]
     (row,) = equal_error.rows(ours, theirs, 0.0, (0.05,))
     assert row.ours.name == "a"
-    assert equal_error.find_stateful(ours) == {"incremental": 2}
+    assert equal_error.find_retaining(ours) == {"incremental": 2}
     (row,) = equal_error.rows([filled], theirs, 0.0, (0.05,))
     assert row.ours is None
     assert row.speedup("mitsuba") == ""

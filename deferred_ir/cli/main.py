@@ -7,6 +7,7 @@ import importlib
 import logging
 import os
 import pkgutil
+import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn, Protocol, cast
@@ -98,7 +99,7 @@ def find_commands() -> Iterator[tuple[str, Command]]:
 
 
 def _parse(argv: Sequence[str]) -> argparse.Namespace:
-    """Parse the command line; `run` of the result is the command's."""
+    """Parse the command line; `run` of the result is the command's, `command_line` what a shell reads."""
     parser = Parser(prog="deferred-ir", description="Global illumination in milliseconds, on OpenGL.")
     parser.add_argument("--version", action=PrintVersion, nargs=0, help="show the version and exit")
     group = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
@@ -111,4 +112,6 @@ def _parse(argv: Sequence[str]) -> argparse.Namespace:
     word = next((text for text in argv if not text.startswith("-")), None)
     if word is not None and word not in names:
         parser.error(f"no command '{word}'{did_you_mean(word, names)}")
-    return parser.parse_args(argv)
+    arguments = parser.parse_args(argv)
+    arguments.command_line = shlex.join([DISTRIBUTION, *argv])
+    return arguments

@@ -33,6 +33,11 @@ class Gpu:
         self._uniforms: Any = None
         self._samplers: dict[tuple[bool, str | None, bool], Any] = {}
 
+    @property
+    def driver(self) -> str:
+        """What the driver calls its OpenGL (GL_VERSION), for most drivers with their own version."""
+        return str(self.ctx.info["GL_VERSION"])
+
     @cached_property
     def max_size(self) -> int:
         """Largest width or height of a render target."""

@@ -19,6 +19,7 @@ from deferred_ir.profiling.peers.points import PeerKey, PeerPoint, Peers
 from deferred_ir.profiling.sweep.edge_mask import Mask
 from deferred_ir.profiling.sweep.equal_error import TARGETS
 from deferred_ir.profiling.sweep.reference import Truth
+from deferred_ir.report.origin import Origin
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth import metrics
 
@@ -42,6 +43,7 @@ class Course:
     seeds: int
     truth: Truth
     mask: Mask
+    origin: Origin
 
     @property
     def bounces(self) -> int:
@@ -144,8 +146,8 @@ def _render_point(course: Course, key: PeerKey, process: peer_process.PeerProces
     return PeerPoint(
         key=key,
         about=process.about,
+        origin=course.origin,
         reference=truth.hash,
-        reference_noise=truth.noise,
         mask=course.mask.hash,
         ms=round(rendered.ms, 4),
         relmse=trimmed,

@@ -11,6 +11,7 @@ from pathlib import Path
 from deferred_ir.base.errors import OutputError
 from deferred_ir.base.files import write_json
 from deferred_ir.profiling.peers.peer import NAMES
+from deferred_ir.report.origin import Origin
 
 FOLDER = "peers"
 NOTES = "notes.json"
@@ -35,7 +36,9 @@ class PeerKey:
 
 @dataclass(frozen=True)
 class PeerPoint:
-    """One image of a peer. about: its version. ms: wall time. reference, mask: hashes of what it was compared with.
+    """One image of a peer. about: its version. origin: the run that measured it. ms: wall time.
+
+    reference, mask: hashes of what it was compared with.
 
     relmse, relmse_untrimmed and bias are over all pixels that show a surface, so they include the difference between a
     pixel's mean and its centre. relmse_masked is over the pixels without an edge, None if there are none.
@@ -43,8 +46,8 @@ class PeerPoint:
 
     key: PeerKey
     about: str
+    origin: Origin
     reference: str
-    reference_noise: float | None
     mask: str
     ms: float
     relmse: float
@@ -77,7 +80,7 @@ def read(file: Path) -> PeerPoint | None:
         data = json.loads(file.read_text(encoding="utf-8"))
         if data.keys() != {f.name for f in fields(PeerPoint)} or not data["ms"] > 0:
             return None
-        point = PeerPoint(**{**data, "key": PeerKey(**data["key"])})
+        point = PeerPoint(**{**data, "key": PeerKey(**data["key"]), "origin": Origin(**data["origin"])})
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return None  # the point is measured again
     return point if point.key.name == file.stem else None

@@ -8,12 +8,17 @@ from typing import Any
 
 from deferred_ir.profiling.sweep.equal_error import Rung
 from deferred_ir.profiling.sweep.groups import Group
+from deferred_ir.truth.reference_noise import ReferenceNoise
+
+NEAR = 30
+"""The reference's noise is drawn unless the least error is more than so many times as large."""
 
 
-def draw_svg(groups: Sequence[Group], title: str, peers: Sequence[Rung] = ()) -> str:
+def draw_svg(groups: Sequence[Group], title: str, peers: Sequence[Rung], noise: ReferenceNoise) -> str:
     """Draw relMSE over frame time, log-log: means with the span over the seeds, and the Pareto front. Returns SVG.
 
-    peers: drawn with squares; with peers all errors have to be masked, those of `groups` as well.
+    peers: drawn with squares; with peers all errors have to be masked, those of `groups` as well. Graphs that retain
+    samples are drawn hollow. noise: of the reference, a grey band up to twice of it.
     """
     import matplotlib as mpl
     from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -25,13 +30,21 @@ def draw_svg(groups: Sequence[Group], title: str, peers: Sequence[Rung] = ()) ->
     panel = figure.add_subplot()
     for graph in dict.fromkeys(group.graph for group in groups):
         line = sorted((group for group in groups if group.graph == graph), key=lambda group: group.vpls)
-        _draw_line(panel, graph, [(group.frame_ms, group.vpls, group) for group in line], fmt="o-", lw=1.5, size=8)
+        points = [(group.frame_ms, group.vpls, group) for group in line]
+        if any(group.retains_samples for group in line):
+            _draw_line(panel, f"{graph} (retains samples)", points, fmt="o-.", lw=1, size=8, mfc="white")
+        else:
+            _draw_line(panel, graph, points, fmt="o-", lw=1.5, size=8)
     for peer in dict.fromkeys(rung.peer for rung in peers):
         ladder = [(rung.ms, rung.spp, rung) for rung in peers if rung.peer == peer]
         _draw_line(panel, peer, ladder, fmt="s--", lw=1, size=6)
     front = sorted((group for group in groups if group.pareto), key=lambda group: group.frame_ms)
     style: dict[str, Any] = {"color": "black", "lw": 0.8, "ls": ":", "marker": "o", "mfc": "none", "ms": 10}
     panel.plot([group.frame_ms for group in front], [group.relmse for group in front], label="Pareto front", **style)
+    least = min([*(group.relmse for group in groups), *(rung.relmse for rung in peers)])
+    if noise.relmse and least < NEAR * noise.relmse:
+        panel.axhspan(noise.relmse / 2, 2 * noise.relmse, color="grey", alpha=0.15, lw=0, label="the reference's noise")
+        panel.axhline(noise.relmse, color="grey", lw=0.8)
     panel.margins(0.08)
     panel.set_xscale("log")
     panel.set_yscale("log")
@@ -51,12 +64,20 @@ def draw_svg(groups: Sequence[Group], title: str, peers: Sequence[Rung] = ()) ->
 
 
 def _draw_line(
-    panel: Any, label: str, points: Sequence[tuple[float, int, Group | Rung]], *, fmt: str, lw: float, size: int
+    panel: Any,
+    label: str,
+    points: Sequence[tuple[float, int, Group | Rung]],
+    *,
+    fmt: str,
+    lw: float,
+    size: int,
+    mfc: str | None = None,
 ) -> None:
     """Draw (milliseconds, number beside the point, errors) with the span over the seeds."""
     means = [errors.relmse for *_, errors in points]
     below = [errors.relmse - errors.relmse_low for *_, errors in points]
     above = [errors.relmse_high - errors.relmse for *_, errors in points]
-    panel.errorbar([ms for ms, *_ in points], means, (below, above), fmt=fmt, ms=4, lw=lw, capsize=3, label=label)
+    style: dict[str, Any] = {"fmt": fmt, "ms": 4, "lw": lw, "mfc": mfc, "capsize": 3, "label": label}
+    panel.errorbar([ms for ms, *_ in points], means, (below, above), **style)
     for ms, number, errors in points:
         panel.annotate(f"{number}", (ms, errors.relmse), (5, 4), textcoords="offset points", size=size)

@@ -11,14 +11,18 @@ from typing import Any
 
 from deferred_ir.base.errors import SettingError
 from deferred_ir.base.files import write_json
+from deferred_ir.profiling.peers.points import PeerPoint
 from deferred_ir.profiling.report import tables
 from deferred_ir.profiling.report.plot import draw_svg
 from deferred_ir.profiling.sweep import equal_error, points
 from deferred_ir.profiling.sweep.equal_error import Row, Rung
-from deferred_ir.profiling.sweep.groups import Group, advise, group_points, is_flagged
+from deferred_ir.profiling.sweep.groups import BUDGET, Group, advise, group_points
 from deferred_ir.profiling.sweep.points import Point
-from deferred_ir.profiling.sweep.reference import MOST_NOISE
+from deferred_ir.profiling.sweep.reference import FILE
 from deferred_ir.profiling.sweep.run import Results
+from deferred_ir.report.origin import Origin
+from deferred_ir.truth import reference_noise
+from deferred_ir.truth.reference_noise import ReferenceNoise
 
 
 def check_libraries() -> None:
@@ -42,36 +46,54 @@ class _Figures:
     retaining: Mapping[str, int]
 
 
-def write_all(folder: Path, results: Results) -> str:
-    """Write every file of the report. Returns the recommendation, one sentence."""
+def write_all(folder: Path, results: Results, budget: float = BUDGET) -> str:
+    """Write every file of the report. Returns the recommendation for `budget` milliseconds a frame, one sentence."""
     measured = results.points
     figures = _compute(results)
     about = _describe(results)
-    rows = [*map(tables.row, measured), *map(tables.peer_row, results.peers.points)]
+    noise = _find_noise(results)
+    rows = [*map(tables.row, measured), *(tables.peer_row(point, noise) for point in results.peers.points)]
     tables.write_csv(folder / "error_vs_time.csv", rows)
     tables.write_csv(folder / "passes.csv", tables.pass_rows(measured))
     data = {
         **about,
         "rows": rows,
-        "groups": [asdict(group) for group in figures.groups],
-        "peers": [asdict(rung) for rung in figures.rungs],
+        "groups": [_make_group_row(group) for group in figures.groups],
+        "peers": [{**asdict(rung), "flagged": noise.flag(rung.relmse)} for rung in figures.rungs],
         "peer_notes": dict(results.peers.notes),
         "equal_error": [row.as_dict() for row in figures.equal],
     }
     write_json(folder / "error_vs_time.json", data)
-    plot = draw_svg(figures.compared, measured[0].scene, figures.rungs)
+    plot = draw_svg(figures.compared, measured[0].scene, figures.rungs, noise)
     tables.write_text(folder / "error_vs_time.svg", plot)
     write_json(folder / "trace.json", tables.trace(measured))
-    advice = advise(figures.groups)
+    advice = advise(figures.groups, measured[0].key.size, budget)
     tables.write_text(folder / "report.html", _render_page(folder, results, figures, about, plot=plot, advice=advice))
     return advice
+
+
+def _find_noise(results: Results) -> ReferenceNoise:
+    """Return the noise of the reference, which is the same for all points."""
+    return results.points[0].reference_about.noise
+
+
+def _make_group_row(group: Group) -> dict[str, Any]:
+    row = asdict(group)
+    del row["noise"]
+    return {**row, "flagged": group.noise.flag(group.relmse)}
+
+
+def _list_origins(results: Results) -> list[Origin]:
+    """Return the runs that measured points, by their dates."""
+    points: list[Point | PeerPoint] = [*results.points, *results.peers.points]
+    return sorted(dict.fromkeys(point.origin for point in points), key=lambda origin: origin.date)
 
 
 def _compute(results: Results) -> _Figures:
     groups = group_points(results.points)
     rungs = equal_error.group_rungs(results.peers.points)
     compared = group_points(results.points, masked=True) if rungs else groups
-    equal = equal_error.rows(compared, rungs, results.points[0].reference_noise)
+    equal = equal_error.rows(compared, rungs, _find_noise(results))
     return _Figures(groups, compared, rungs, equal, equal_error.find_retaining(groups))
 
 
@@ -83,8 +105,10 @@ def _describe(results: Results) -> dict[str, Any]:
         "scene_hash": first.key.scene_hash,
         "time": first.time,
         "size": first.key.size,
-        "reference": {"hash": first.reference, "noise": first.reference_noise},
+        "reference": {"hash": first.reference, **asdict(first.reference_about)},
         "devices": sorted({point.device for point in results.points}),
+        "drivers": sorted({point.driver for point in results.points}),
+        "origins": [asdict(origin) for origin in _list_origins(results)],
         "flip_parameters": first.flip_parameters,
         "left_out_by_mask": results.mask.left_out if results.mask else None,
     }
@@ -109,9 +133,10 @@ def _render_page(
         left_out=[(graph, entry) for (graph, _), entry in left_out.items()],
         software=any(point.software for point in results.points),
         flip_notes=sorted({point.flip_note for point in results.points if point.flip_note}),
-        flagged=sum(map(is_flagged, results.points)),
+        noise=_find_noise(results),
+        own_reference=about["reference"]["file"] == FILE,
+        most_noise=reference_noise.MOST,
         total=len(results.points),
-        most_noise=MOST_NOISE,
         groups=figures.groups,
         rungs=figures.rungs,
         equal=figures.equal,

@@ -11,10 +11,8 @@ from typing import Any
 
 from deferred_ir.base.files import write_whole
 from deferred_ir.profiling.peers.points import PeerPoint
-from deferred_ir.profiling.sweep.groups import is_flagged, is_noisy
 from deferred_ir.profiling.sweep.points import Point
-
-NOISY = "reference_noise"
+from deferred_ir.truth.reference_noise import ReferenceNoise
 
 
 def row(point: Point) -> dict[str, Any]:
@@ -29,7 +27,7 @@ def row(point: Point) -> dict[str, Any]:
         "bias": point.bias,
         "flip": point.flip,
         "memory": sum(point.memory.values()),
-        "flagged": NOISY if is_flagged(point) else "",
+        "flagged": point.reference_about.noise.flag(point.relmse),
         "vpls_alive": point.vpls_alive,
         "scene_hash": point.key.scene_hash,
         "graph_hash": point.key.graph_hash,
@@ -39,9 +37,11 @@ def row(point: Point) -> dict[str, Any]:
     }
 
 
-def peer_row(point: PeerPoint) -> dict[str, Any]:
-    """Return a row for a peer's point, with the same columns: its name is the graph, its version the device."""
-    doubtful = point.relmse_masked is not None and is_noisy(point.reference_noise, point.relmse_masked)
+def peer_row(point: PeerPoint, noise: ReferenceNoise) -> dict[str, Any]:
+    """Return a row for a peer's point, with the same columns: its name is the graph, its version the device.
+
+    noise: of the reference; by it the masked error is flagged.
+    """
     return {
         "graph": point.key.peer,
         "vpls": None,
@@ -52,7 +52,7 @@ def peer_row(point: PeerPoint) -> dict[str, Any]:
         "bias": point.bias,
         "flip": None,
         "memory": None,
-        "flagged": NOISY if doubtful else "",
+        "flagged": "" if point.relmse_masked is None else noise.flag(point.relmse_masked),
         "vpls_alive": None,
         "scene_hash": point.key.scene_hash,
         "graph_hash": None,

@@ -10,6 +10,8 @@ as in the tables of equal error.
 from __future__ import annotations
 
 import argparse
+import shlex
+import sys
 import time as clock
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -28,6 +30,7 @@ from deferred_ir.profiling.sweep import edge_mask, reference
 from deferred_ir.profiling.sweep.edge_mask import Mask
 from deferred_ir.profiling.sweep.equal_error import TARGETS, Rung, group_rungs, reach
 from deferred_ir.profiling.sweep.reference import Truth
+from deferred_ir.report.origin import describe_run
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import masked_relmse
 
@@ -107,13 +110,13 @@ def report(chosen: argparse.Namespace) -> None:
         mask = edge_mask.load_or_find(folder, scene, size, bar.show)
     options = {"size": size, "vpls": chosen.vpls, "truth": truth, "mask": mask}
     lines = {graph: measure(scene, graph, **options) for graph in chosen.graphs}
-    course = ladder.Course(scene, size, 1, truth, mask)
+    course = ladder.Course(scene, size, 1, truth, mask, describe_run(shlex.join(sys.orig_argv)))
     peers = group_rungs(ladder.run(course, folder, ladder.choose(chosen.peers)).points)
-    write_json(folder / "convergence.json", {"vpls": chosen.vpls, "noise": truth.noise, "lines": lines})
+    write_json(folder / "convergence.json", {"vpls": chosen.vpls, "noise": truth.noise.relmse, "lines": lines})
     plot(f"{scene.name}, {chosen.vpls} VPLs a frame", lines, peers, folder / f"convergence-{scene.name}.svg")
     print(tables(lines, peers))
-    if truth.noise:
-        print(f"\nNoise of the reference itself: {truth.noise:.1g}.")
+    if truth.noise.relmse:
+        print(f"\nNoise of the reference itself: {truth.noise.relmse:.1g}.")
 
 
 def main(words: Sequence[str] | None = None) -> None:

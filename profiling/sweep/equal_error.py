@@ -14,7 +14,8 @@ from statistics import mean
 from typing import Any
 
 from deferred_ir.profiling.peers.points import PeerPoint
-from deferred_ir.profiling.sweep.groups import Group, is_noisy
+from deferred_ir.profiling.sweep.groups import Group
+from deferred_ir.truth.reference_noise import ReferenceNoise
 
 TARGETS = (0.1, 0.03, 0.01, 0.003)
 """Masked relMSE for which times are given."""
@@ -57,12 +58,15 @@ class Reach:
 
 @dataclass(frozen=True)
 class Row:
-    """One error. ours: the time of our fastest graph, None if none was measured. noisy: the reference is too noisy."""
+    """One error. ours: the time of our fastest graph, None if none was measured.
+
+    flagged: by the reference's noise, see `ReferenceNoise.flag`. An error that it hides has no times.
+    """
 
     relmse: float
     ours: Reach | None
     peers: Mapping[str, Reach]
-    noisy: bool
+    flagged: str
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data for JSON."""
@@ -70,8 +74,8 @@ class Row:
 
     def speedup(self, peer: str) -> str:
         """Format how many times as long the peer takes for a table; empty if it is unknown."""
-        ours, theirs = self.ours, self.peers[peer]
-        if ours is None or ours.ms is None:
+        ours, theirs = self.ours, self.peers.get(peer)
+        if ours is None or ours.ms is None or theirs is None:
             return ""
         if theirs.ms is None:
             return f"over {theirs.beyond / ours.ms:.3g}x"
@@ -130,9 +134,9 @@ def find_retaining(groups: Iterable[Group]) -> dict[str, int]:
 
 
 def rows(
-    groups: Sequence[Group], peers: Sequence[Rung], noise: float | None, targets: Sequence[float] = TARGETS
+    groups: Sequence[Group], peers: Sequence[Rung], noise: ReferenceNoise, targets: Sequence[float] = TARGETS
 ) -> list[Row]:
-    """Return the table, empty without peers. groups: with masked errors. noise: the reference's own relMSE."""
+    """Return the table, empty without peers. groups: with masked errors. noise: of the reference."""
     ours: dict[str, list[tuple[float, float]]] = {}
     for group in groups:
         if group.retains_samples:
@@ -144,11 +148,13 @@ def rows(
     if not theirs:
         return []
     return [
-        Row(
+        Row(target, None, {}, noise.flag(target))
+        if noise.hides(target)
+        else Row(
             target,
             _best([reach(graph, choices, target) for graph, choices in ours.items()]),
             {peer: reach(peer, choices, target) for peer, choices in theirs.items()},
-            is_noisy(noise, target),
+            noise.flag(target),
         )
         for target in targets
     ]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from statistics import mean
 
 from deferred_ir.profiling.sweep.points import Point
-from deferred_ir.profiling.sweep.reference import MOST_NOISE
+from deferred_ir.truth.reference_noise import ReferenceNoise
 
 BUDGET = 50.0
 """Milliseconds a frame for which the report recommends settings."""
@@ -23,8 +23,8 @@ SAME = 0.01
 class Group:
     """All seeds of a graph and a number of VPLs: means, and the smallest and largest relMSE. Times in milliseconds.
 
-    frames_to_fill: frames before the measured ones in which the graph fills its state; 1 without state.
-    retains_samples: whether images hold samples of earlier frames.
+    noise: of the reference. frames_to_fill: frames before the measured ones in which the graph fills its state; 1
+    without state. retains_samples: whether images hold samples of earlier frames.
     """
 
     graph: str
@@ -34,20 +34,15 @@ class Group:
     relmse: float
     relmse_low: float
     relmse_high: float
-    flagged: bool
+    noise: ReferenceNoise
     frames_to_fill: int = 1
     retains_samples: bool = False
     pareto: bool = False
 
-
-def is_flagged(point: Point) -> bool:
-    """Return whether the reference's own noise is unknown, or too large beside this point's error."""
-    return is_noisy(point.reference_noise, point.relmse)
-
-
-def is_noisy(noise: float | None, error: float) -> bool:
-    """Return whether a reference's noise (a relMSE, None if unknown) is too large to measure such an error."""
-    return noise is None or noise > MOST_NOISE * error
+    @property
+    def level(self) -> float:
+        """The relMSE to choose by: all that the reference's noise hides are alike."""
+        return self.noise.level(self.relmse)
 
 
 def group_points(points: Iterable[Point], *, masked: bool = False) -> list[Group]:
@@ -76,7 +71,7 @@ def _make_group(graph: str, vpls: int, members: Sequence[tuple[Point, float]]) -
         relmse=mean(errors),
         relmse_low=min(errors),
         relmse_high=max(errors),
-        flagged=any(is_noisy(point.reference_noise, error) for point, error in members),
+        noise=members[0][0].reference_about.noise,
         frames_to_fill=max(point.frames_to_fill for point, _ in members),
         retains_samples=any(point.retains_samples for point, _ in members),
     )
@@ -88,23 +83,31 @@ def _beats(other: Group, group: Group) -> bool:
     Graphs of the same lights differ by rounding errors, which are no gain.
     """
     if other.frame_ms == group.frame_ms:
-        return other.relmse < group.relmse
-    return other.frame_ms < group.frame_ms and other.relmse <= (1 + SAME) * group.relmse
+        return other.level < group.level
+    return other.frame_ms < group.frame_ms and other.level <= (1 + SAME) * group.level
 
 
-def advise(groups: Sequence[Group], budget: float = BUDGET) -> str:
-    """Return a sentence that recommends a graph and a number of VPLs for `budget` milliseconds a frame."""
+def advise(groups: Sequence[Group], size: Sequence[int], budget: float = BUDGET) -> str:
+    """Return a sentence that recommends a graph and a number of VPLs for images of `size` in `budget` milliseconds."""
     groups = [group for group in groups if not group.retains_samples]
     if not groups:
         return "No recommendation: the time of a frame that retains samples of earlier ones is not that of an image."
     within = [group for group in groups if group.frame_ms <= budget]
+    for_budget = f"{budget:.4g} ms at {size[0]}x{size[1]}"
     if within:
-        least = min(group.relmse for group in within)
+        least = min(group.level for group in within)
         # The fastest of the choices that are as good as the best, rounding aside.
-        best = min((g for g in within if g.relmse <= least * (1 + SAME)), key=lambda group: group.frame_ms)
-        start = f"For {budget:g} ms: "
+        best = min((g for g in within if g.level <= least * (1 + SAME)), key=lambda group: group.frame_ms)
+        start = f"For {for_budget}: "
     else:
         best = min(groups, key=lambda group: group.frame_ms)
-        start = f"Nothing here takes {budget:g} ms or less; the fastest: "
-    doubt = "; the noise of the reference is not small beside that" if best.flagged else ""
-    return f"{start}{best.graph}, {best.vpls} VPLs, relMSE {best.relmse:.2g} in {best.frame_ms:.3g} ms{doubt}."
+        start = f"Nothing here takes {for_budget} or less; the fastest: "
+    noise = best.noise
+    doubt = ""
+    if noise.hides(best.relmse):
+        doubt = "; that is the noise of the reference, so better settings cannot be told apart"
+    elif noise.flag(best.relmse):
+        share = "unknown" if noise.relmse is None else f"{noise.relmse / best.relmse:.0%} of that"
+        doubt = f"; the noise of the reference is {share}"
+    error = noise.quote(best.relmse, 2)
+    return f"{start}{best.graph}, {best.vpls} VPLs, relMSE {error} in {best.frame_ms:.3g} ms{doubt}."

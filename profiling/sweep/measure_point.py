@@ -15,6 +15,7 @@ from deferred_ir.profiling.sweep.points import Key, Point
 from deferred_ir.profiling.sweep.reference import Truth
 from deferred_ir.profiling.sweep.sweep import FRAMES, Sweep
 from deferred_ir.report import left_out
+from deferred_ir.report.origin import Origin
 from deferred_ir.truth import error_picture
 from deferred_ir.truth.flip import FlipParameters
 from deferred_ir.truth.metrics import Comparison, compare, masked_relmse
@@ -22,10 +23,11 @@ from deferred_ir.truth.metrics import Comparison, compare, masked_relmse
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """What all points of a sweep have in common: their folder, and the reference and mask they are compared with."""
+    """What all points of a run have in common: their folder, and the reference and mask they are compared with."""
 
     sweep: Sweep
     folder: Path
+    origin: Origin
     truth: Truth
     mask: Mask
 
@@ -55,9 +57,11 @@ def measure(setup: Setup, renderer: Renderer, graph: str, key: Key) -> Point:
         key=key,
         scene=sweep.scene.name,
         graph=graph,
+        origin=setup.origin,
         reference=truth.hash,
-        reference_noise=truth.noise,
+        reference_about=truth.about,
         device=renderer.gpu.device.name,
+        driver=renderer.gpu.driver,
         software=renderer.gpu.device.kind == "software",
         vpls_alive=alive,
         frames_to_fill=plan.frames_to_fill,

@@ -12,7 +12,10 @@ from typing import Any
 
 from deferred_ir.base.errors import OutputError
 from deferred_ir.base.files import write_json, write_whole
+from deferred_ir.profiling.sweep.reference import About
 from deferred_ir.report.left_out import LeftOut
+from deferred_ir.report.origin import Origin
+from deferred_ir.truth.reference_noise import ReferenceNoise
 
 FOLDER = "points"
 PICTURES = (".png", ".error.png")
@@ -45,21 +48,23 @@ class Key:
 class Point:
     """One measured point. Times in milliseconds, memory in bytes.
 
-    reference: hash of the reference image. reference_noise: the reference's own relMSE, None if unknown. device:
-    GL_RENDERER. software: whether that is a driver without a GPU. frames_to_fill: frames until state between frames is
-    complete, before the measured frames; 1 for graphs without such state. retains_samples: whether images hold samples
-    of earlier frames, so that the time of a frame is not that of an image. frames: wall time of each measured frame.
-    laps: for each frame (pass, GPU, CPU) in the order in which the passes ran. relmse_masked: relMSE of the pixels
-    without an edge, None if there is no such pixel. time: of the last frame, where something moves, seconds. pictures:
-    whether the files of PICTURES lie beside the point.
+    origin: the run that measured it. reference: hash of the reference image. device, driver: GL_RENDERER, GL_VERSION.
+    software: whether that is a driver without a GPU. frames_to_fill: frames until state between frames is complete,
+    before the measured frames; 1 for graphs without such state. retains_samples: whether images hold samples of earlier
+    frames, so that the time of a frame is not that of an image. frames: wall time of each measured frame. laps: for
+    each frame (pass, GPU, CPU) in the order in which the passes ran. relmse_masked: relMSE of the pixels without an
+    edge, None if there is no such pixel. time: of the last frame, where something moves, seconds. pictures: whether the
+    files of PICTURES lie beside the point.
     """
 
     key: Key
     scene: str
     graph: str
+    origin: Origin
     reference: str
-    reference_noise: float | None
+    reference_about: About
     device: str
+    driver: str
     software: bool
     vpls_alive: int
     frames_to_fill: int
@@ -102,7 +107,10 @@ def read(folder: Path, name: str) -> Point | None:
         left_out = [LeftOut(**entry) for entry in data["left_out"]]
         if data.keys() != {f.name for f in fields(Point)} or not all(data["frames"]):
             return None
-        point = Point(**{**data, "key": Key(**data["key"]), "laps": laps, "left_out": left_out})
+        about = data["reference_about"]
+        about = About(**{**about, "noise": ReferenceNoise(**about["noise"])})
+        parts = {"key": Key(**data["key"]), "origin": Origin(**data["origin"]), "reference_about": about}
+        point = Point(**{**data, **parts, "laps": laps, "left_out": left_out})
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
         return None  # the point is measured again
     complete = not point.pictures or all(path(folder, name, suffix).is_file() for suffix in PICTURES)

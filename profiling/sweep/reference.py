@@ -17,23 +17,36 @@ from deferred_ir.base.progress import ProgressBar
 from deferred_ir.output.image import read_radiance
 from deferred_ir.output.metadata import metadata_path, read_metadata
 from deferred_ir.scene.scene import Scene
+from deferred_ir.truth import reference_noise
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.reference import trace_reference
+from deferred_ir.truth.reference_noise import ReferenceNoise
 
 FILE = "reference.npy"
 FIRST_SPP, MOST_SPP = 256, 4096
-MOST_NOISE = 0.1
-"""Most noise of a reference as a fraction of an error measured with it; rows with more are flagged."""
 MARGIN = 1.5
 """Safety factor: errors of other seeds may be smaller than those that decide the number of paths."""
 
 
+@dataclass(frozen=True)
+class About:
+    """What a report says of a reference. file: as the command names it, FILE for that of the sweep's folder.
+
+    made: "256 paths a pixel".
+    """
+
+    file: str
+    made: str
+    noise: ReferenceNoise
+
+
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """A reference image. radiance: (H, W, 3). metadata: the contents of its JSON file."""
+    """A reference image. radiance: (H, W, 3). metadata: those of its JSON file. file: as the command names it."""
 
     radiance: Array
     metadata: Mapping[str, Any]
+    file: str = FILE
 
     @property
     def hash(self) -> str:
@@ -46,10 +59,16 @@ class Truth:
         return self.metadata.get("hit_fraction") or None
 
     @property
-    def noise(self) -> float | None:
-        """relMSE of its own noise, None if unknown."""
-        value = self.metadata.get("noise")
-        return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+    def noise(self) -> ReferenceNoise:
+        """How large an error it has itself."""
+        return ReferenceNoise.from_metadata(self.metadata)
+
+    @property
+    def about(self) -> About:
+        """What a report says of it."""
+        counts = (("spp", "paths a pixel"), ("vpls", "VPLs with visibility by rays"))
+        made = [f"{self.metadata[key]} {what}" for key, what in counts if self.metadata.get(key)]
+        return About(self.file, ", ".join(made) or "its metadata do not say how it was made", self.noise)
 
 
 def read(path: Path, scene: Scene, size: tuple[int, int], time: float = 0.0) -> Truth:
@@ -75,7 +94,7 @@ def read(path: Path, scene: Scene, size: tuple[int, int], time: float = 0.0) -> 
             f"{path}: shows the scene at {metadata.get('time', 0.0)} s, but the sweep's frames end at {time} s; give "
             f"--time {metadata.get('time', 0.0)}"
         )
-    return Truth(radiance, metadata)
+    return Truth(radiance, metadata, str(path))
 
 
 def load_or_trace(
@@ -104,7 +123,7 @@ def load_or_trace(
     while True:
         smallest = min(relmse(image, truth.radiance, truth.hit)[0] for image in probes)
         spp = int(truth.metadata["spp"])
-        if (truth.noise or 0.0) * MARGIN <= MOST_NOISE * smallest or 2 * spp > MOST_SPP:
+        if (truth.noise.relmse or 0.0) * MARGIN <= reference_noise.MOST * smallest or 2 * spp > MOST_SPP:
             break
         # Double the paths. The seed is new: all seeds before were smaller.
         truth = _mean(truth, _trace(scene, size, spp, bounces, seed=spp, bar=bar))

@@ -19,6 +19,7 @@ from deferred_ir.profiling.sweep.measure_point import Setup
 from deferred_ir.profiling.sweep.points import Point
 from deferred_ir.profiling.sweep.reference import Truth
 from deferred_ir.profiling.sweep.sweep import Sweep, Task
+from deferred_ir.report.origin import Origin
 
 OVERHEAD = 16
 """Cost of a frame besides its VPLs, in VPLs: weighs the points for the time left on the progress bar."""
@@ -33,8 +34,11 @@ class Results:
     mask: Mask | None
 
 
-def run(sweep: Sweep, folder: Path, given: Path | None) -> Results:
-    """Measure what is not in `folder` yet. given: a reference image to use. Returns all points of the sweep's shard."""
+def run(sweep: Sweep, folder: Path, given: Path | None, origin: Origin) -> Results:
+    """Measure what is not in `folder` yet. Returns all points of the sweep's shard.
+
+    given: a reference image to use. origin: this run, saved with what it measures.
+    """
     truth = reference.read(given, sweep.scene, sweep.size, sweep.time) if given else None
     device = name_device(sweep.device)
     points.make_folder(folder)
@@ -45,10 +49,10 @@ def run(sweep: Sweep, folder: Path, given: Path | None) -> Results:
     done, ahead = _find_points(sweep, folder, truth, device)
     if done:
         print(f"{len(done)} of {len(done) + len(ahead)} points are there already", file=sys.stderr)
-    done += _measure(Setup(sweep, folder, truth, mask), ahead)
+    done += _measure(Setup(sweep, folder, origin, truth, mask), ahead)
     peers = Peers()
     if sweep.peers and sweep.shard[0] == 1:
-        course = ladder.Course(sweep.moment, sweep.size, sweep.seeds, truth, mask)
+        course = ladder.Course(sweep.moment, sweep.size, sweep.seeds, truth, mask, origin)
         peers = ladder.run(course, folder, sweep.peers)
     return Results(points.sort(done), peers, mask)
 

@@ -15,6 +15,7 @@ from deferred_ir.profiling.sweep import groups, sweep
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.reference import trace_reference
+from deferred_ir.truth.reference_noise import ReferenceNoise
 
 SIZE = (24, 24)
 SMALL = ["--size", "24x24"]
@@ -125,9 +126,8 @@ def test_what_retains_samples_is_neither_on_the_front_nor_recommended(scene_file
     told = {group["graph"]: group for group in json.loads((swept / "error_vs_time.json").read_text())["groups"]}
     assert (told["incremental"]["retains_samples"], told["incremental"]["pareto"]) == (True, False)
     assert (told["deferred"]["retains_samples"], told["deferred"]["pareto"]) == (False, True)
-    assert "No recommendation" in groups.advise(
-        [groups.Group("a", 8, 1, 1, 0.1, 0.1, 0.1, False, retains_samples=True)]
-    )
+    retaining = groups.Group("a", 8, 1, 1, 0.1, 0.1, 0.1, ReferenceNoise(0.0, ""), retains_samples=True)
+    assert "No recommendation" in groups.advise([retaining], SIZE)
 
 
 def test_a_sweep_takes_a_reference_of_its_time_only(scene_file, swept, tmp_path, capsys):

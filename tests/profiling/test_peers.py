@@ -18,6 +18,8 @@ from small_scenes import room
 
 from deferred_ir.base.errors import SettingError
 from deferred_ir.cli.main import main
+from deferred_ir.report.origin import Origin
+from deferred_ir.truth.reference_noise import ReferenceNoise
 
 ladder = import_module("deferred_ir.profiling.peers.ladder")
 peer_points = import_module("deferred_ir.profiling.peers.points")
@@ -27,6 +29,8 @@ groups = import_module("deferred_ir.profiling.sweep.groups")
 peers = import_module("deferred_ir.profiling.peers.peer")
 
 SMALL = ["--graphs", "deferred", "--vpls", "4,16", "--seeds", "2", "--size", "32x32", "--device", "software"]
+EXACT = ReferenceNoise(0.0, "")
+ORIGIN = Origin("deferred-ir profile", "2026-01-01 00:00 UTC", "1.0", None, "a machine")
 RUNGS = 7
 """1 to 64 paths."""
 
@@ -280,7 +284,7 @@ def test_names_of_peers():
 
 def point(spp, seed, ms, error):
     key = peer_points.PeerKey("s", [4, 4], 1, "mitsuba", spp, seed)
-    return peer_points.PeerPoint(key, "Fake", "r", 0.0, "m", ms, error, error, 0.0, error)
+    return peer_points.PeerPoint(key, "Fake", ORIGIN, "r", "m", ms, error, error, 0.0, error)
 
 
 def climbed(ms_a_path, error_of_one, seeds=3):
@@ -345,17 +349,17 @@ def rung(spp, ms, error, peer="mitsuba"):
 
 
 def group(graph, vpls, ms, error):
-    return groups.Group(graph, vpls, 1, ms, error, error, error, False)
+    return groups.Group(graph, vpls, 1, ms, error, error, error, EXACT)
 
 
 def test_graphs_that_retain_samples_are_left_out():
     filled = replace(group("incremental", 16, 1, 0.001), frames_to_fill=2, retains_samples=True)
     ours = [replace(group("incremental", 8, 1, 0.05), retains_samples=True), filled, group("a", 4, 100, 0.02)]
     theirs = [rung(1, 100, 0.2), rung(2, 1000, 0.02)]
-    (row,) = equal_error.rows(ours, theirs, 0.0, (0.05,))
+    (row,) = equal_error.rows(ours, theirs, EXACT, (0.05,))
     assert row.ours.name == "a"
     assert equal_error.find_retaining(ours) == {"incremental": 2}
-    (row,) = equal_error.rows([filled], theirs, 0.0, (0.05,))
+    (row,) = equal_error.rows([filled], theirs, EXACT, (0.05,))
     assert row.ours is None
     assert row.speedup("mitsuba") == ""
 
@@ -363,7 +367,10 @@ def test_graphs_that_retain_samples_are_left_out():
 def test_the_speedup_is_over_our_fastest_graph():
     ours = [group("a", 4, 10, 0.2), group("a", 8, 20, 0.02), group("b", 4, 12, 0.05), group("b", 8, 900, 0.005)]
     theirs = [rung(1, 100, 0.2), rung(2, 1000, 0.02), rung(4, 2000, 0.015), rung(1, 7, 0.06, "cycles")]
-    rows = {row.relmse: row for row in equal_error.rows(ours, theirs, 0.0005, (0.5, 0.1, 0.05, 0.02, 0.01, 0.001))}
+    rows = {
+        row.relmse: row
+        for row in equal_error.rows(ours, theirs, ReferenceNoise(0.0004, ""), (0.5, 0.1, 0.05, 0.02, 0.01, 0.001))
+    }
     assert (rows[0.1].ours.name, rows[0.1].ours.at_most) == ("b", True)
     assert rows[0.1].speedup("mitsuba") == f"at least {rows[0.1].peers['mitsuba'].ms / 12:.3g}x"
     assert rows[0.02].ours.name == "a"
@@ -375,10 +382,17 @@ def test_the_speedup_is_over_our_fastest_graph():
     assert rows[0.001].ours.floor == 0.005
     assert rows[0.001].speedup("mitsuba") == ""
     assert rows[0.5].speedup("mitsuba") == ""  # both start below it
-    assert [row.noisy for row in rows.values()] == [False] * 5 + [True]
+    assert [row.flagged for row in rows.values()] == [""] * 5 + ["reference_noise"]
     assert rows[0.1].as_dict()["speedup"]["mitsuba"]
-    assert equal_error.rows(ours, [], 0.0) == []
-    assert equal_error.rows([], theirs, 0.0)[0].ours is None
+    assert equal_error.rows(ours, [], EXACT) == []
+    assert equal_error.rows([], theirs, EXACT)[0].ours is None
+
+
+def test_an_error_that_the_noise_hides_has_no_times():
+    ours, theirs = [group("a", 4, 10, 0.2), group("a", 8, 20, 0.002)], [rung(1, 100, 0.2), rung(2, 1000, 0.002)]
+    shown, hidden = equal_error.rows(ours, theirs, ReferenceNoise(0.002, ""), (0.01, 0.003))
+    assert (shown.flagged, shown.ours.name) == ("reference_noise", "a")
+    assert (hidden.flagged, hidden.ours, hidden.peers, hidden.speedup("mitsuba")) == ("below_noise", None, {}, "")
 
 
 def test_rungs_are_means_over_seeds():

@@ -6,6 +6,7 @@ import re
 import shutil
 import sys
 from dataclasses import replace
+from html import escape
 from html.parser import HTMLParser
 from importlib import import_module
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from deferred_ir.cli.main import main
+from deferred_ir.truth.reference_noise import ReferenceNoise
 
 measure_point = import_module("deferred_ir.profiling.sweep.measure_point")
 sweep_points = import_module("deferred_ir.profiling.sweep.points")
@@ -104,7 +106,8 @@ def test_the_reference_is_quiet_enough_or_the_rows_say_so(whole):
     record = json.loads((whole / "reference.json").read_text())
     assert record["spp"] >= sweep_reference.FIRST_SPP
     for row in table(whole):
-        assert row["flagged"] == ("reference_noise" if record["noise"] > 0.1 * float(row["relmse"]) else "")
+        part = record["noise"] / float(row["relmse"])
+        assert row["flagged"] == ("below_noise" if part > 0.5 else "reference_noise" if part > 0.1 else "")
 
 
 def test_passes_add_up_to_the_frame(whole):
@@ -167,6 +170,38 @@ def test_the_page_stands_alone(whole):
     assert page.tags.count("svg") == 1
     assert page.tags.count("img") == 2 * 4
     assert "GPU time is CPU time" in text
+
+
+def test_the_page_says_what_was_measured_how_where_and_against_what(whole):
+    page = (whole / "report.html").read_text()
+    told = json.loads((whole / "error_vs_time.json").read_text())
+    (origin,) = told["origins"]
+    assert origin["command"].startswith("deferred-ir profile cornell -o ")
+    assert origin["command"].endswith("--size 32x32 --device software --peers none")
+    for word in (*(value for value in origin.values() if value), *told["devices"], *told["drivers"]):
+        assert escape(word) in page, word
+    record = json.loads((whole / "reference.json").read_text())
+    noise = told["reference"]["noise"]
+    assert noise == {"relmse": record["noise"], "how": f"from the spread of its {record['spp']} paths a pixel"}
+    assert f"relMSE {record['noise']:.2g}, {noise['how']}" in page
+    assert "reference.npy beside this page" in page
+
+
+def test_errors_that_the_noise_hides_are_bounds_on_the_page(copied):
+    quiet = (copied / "report.html").read_text()
+    assert "hidden by noise</td>" not in quiet
+    for path in points(copied):
+        data = json.loads(path.read_text())
+        data["reference_about"]["noise"]["relmse"] = data["relmse"]
+        path.write_text(json.dumps(data))
+    assert profile(copied) == 0
+    told = json.loads((copied / "error_vs_time.json").read_text())
+    hidden = [group for group in told["groups"] if group["flagged"] == "below_noise"]
+    page = (copied / "report.html").read_text()
+    assert page.count("hidden by noise</td>") == len(hidden) > 0
+    for group in hidden:
+        assert f">{group['relmse']:.3g}<" not in page
+        assert group["relmse"] > 0  # as it was measured
 
 
 def test_a_finished_sweep_measures_nothing_again(copied, measured, monkeypatch):
@@ -249,8 +284,8 @@ def test_shards_merge_to_the_table_of_the_whole(whole, tmp_path, measured):
     assert errors == [(row["graph"], row["vpls"], row["seed"], row["relmse"]) for row in table(whole)]
 
 
-def group(graph, vpls, frame_ms, relmse, flagged=False):
-    return groups.Group(graph, vpls, 1, frame_ms, relmse, relmse, relmse, flagged)
+def group(graph, vpls, frame_ms, relmse, noise=0.0001):
+    return groups.Group(graph, vpls, 1, frame_ms, relmse, relmse, relmse, ReferenceNoise(noise, ""))
 
 
 def test_nothing_faster_beats_the_pareto_front(whole):
@@ -272,11 +307,20 @@ def test_nothing_faster_beats_the_pareto_front(whole):
 
 def test_the_advice_is_the_best_that_is_fast_enough():
     choices = [group("a", 16, 10, 0.1), group("a", 64, 49, 0.02), group("b", 64, 45, 0.05), group("a", 256, 90, 0.01)]
-    assert groups.advise(choices) == "For 50 ms: a, 64 VPLs, relMSE 0.02 in 49 ms."
+    assert groups.advise(choices, (64, 48)) == "For 50 ms at 64x48: a, 64 VPLs, relMSE 0.02 in 49 ms."
     equal = [group("slow", 64, 45, 0.02), group("fast", 64, 20, 0.0201)]
-    assert "fast" in groups.advise(equal)
-    assert groups.advise(choices, 5).startswith("Nothing here takes 5 ms or less; the fastest: a, 16 VPLs")
-    assert "noise" in groups.advise([group("a", 16, 10, 0.1, True)])
+    assert "fast" in groups.advise(equal, (64, 48))
+    none = "Nothing here takes 5 ms at 64x48 or less; the fastest: a, 16 VPLs"
+    assert groups.advise(choices, (64, 48), 5).startswith(none)
+
+
+def test_the_advice_tells_how_much_of_the_error_is_noise():
+    advice = groups.advise([group("a", 16, 10, 0.1, 0.02)], (64, 48))
+    assert advice.endswith("relMSE 0.1 in 10 ms; the noise of the reference is 20% of that.")
+    assert groups.advise([group("a", 16, 10, 0.1, None)], (64, 48)).endswith("the noise of the reference is unknown.")
+    hidden = [group("slow", 64, 45, 0.021, 0.02), group("fast", 16, 20, 0.039, 0.02)]
+    advice = groups.advise(hidden, (64, 48))
+    assert "fast, 16 VPLs, relMSE < 0.02 in 20 ms; that is the noise of the reference" in advice
 
 
 def fault(capsys, *arguments):

@@ -71,6 +71,7 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> Results:
     from deferred_ir.profiling.peers import ladder
     from deferred_ir.profiling.sweep.run import run as run_sweep
     from deferred_ir.profiling.sweep.sweep import Sweep
+    from deferred_ir.report.origin import describe_run
 
     counts = _parse_vpls(VPLS if arguments.vpls is None else arguments.vpls)
     shard = _parse_shard(arguments.shard)
@@ -82,7 +83,8 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> Results:
     time = LAST if arguments.time is None else arguments.time
     what = Sweep(scene, size, graphs, counts, seeds, arguments.device, shard, peers, time if scene.moves else 0.0)
     print_notes(list_notes(scene))
-    return run_sweep(what, folder, Path(arguments.reference) if arguments.reference else None)
+    given = Path(arguments.reference) if arguments.reference else None
+    return run_sweep(what, folder, given, describe_run(arguments.command_line))
 
 
 def _merge(arguments: argparse.Namespace, folder: Path) -> Results:

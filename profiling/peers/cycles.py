@@ -47,7 +47,7 @@ class Peer:
             import bpy
 
             self._bpy: Any = bpy
-            bpy.ops.wm.read_factory_set_up(use_empty=True)
+            bpy.ops.wm.read_factory_settings(use_empty=True)
             cycles_scene.build(bpy, scene.at(0.0))
             _set_up(bpy.context.scene, size, bounces)
         self.about = f"Cycles of Blender {bpy.app.version_string}, CPU"

@@ -18,6 +18,11 @@ def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows))
 
 
+def format_ms(ms: float) -> str:
+    """Format a time with three digits: "77 ms", "1.65 s"."""
+    return f"{ms:.3g} ms" if ms < 999.5 else f"{ms / 1e3:.3g} s"
+
+
 @contextmanager
 def panels(names: Iterable[str], path: Path, y_label: str = "", share_y: bool = False) -> Iterator[list[Any]]:
     """Open a row of Matplotlib axes, one for each name, and write them as SVG at the end.

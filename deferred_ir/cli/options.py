@@ -76,6 +76,22 @@ def parse_seconds(text: str) -> float:
     return seconds
 
 
+def parse_duration(text: str) -> float:
+    """Read how long something may take: "200ms", "0.2s" or "0.2". Returns seconds, above 0."""
+    number, factor = text, 1.0
+    for unit, seconds in (("ms", 1e-3), ("s", 1.0)):
+        if text.endswith(unit):
+            number, factor = text.removesuffix(unit), seconds
+            break
+    try:
+        duration = float(number) * factor
+    except ValueError:
+        duration = math.nan
+    if not 0 < duration <= LATEST:
+        raise argparse.ArgumentTypeError(f"'{text}' is no duration, such as 200ms or 0.2s")
+    return duration
+
+
 def split_list(text: str) -> list[str]:
     """Split "a, b,a" at the commas: each word once, in order, without white space and empty words."""
     return list(dict.fromkeys(word for part in text.split(",") if (word := part.strip())))

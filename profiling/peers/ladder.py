@@ -18,13 +18,13 @@ from deferred_ir.profiling.peers.peer import NAMES
 from deferred_ir.profiling.peers.points import PeerKey, PeerPoint, Peers
 from deferred_ir.profiling.sweep.edge_mask import Mask
 from deferred_ir.profiling.sweep.equal_error import TARGETS
-from deferred_ir.profiling.sweep.reference import Truth
+from deferred_ir.profiling.sweep.reference import Truth, find_bounces
 from deferred_ir.report.origin import Origin
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth import metrics
 
 ENOUGH = min(TARGETS) / 1.5
-"""The ladder ends below this error, so that the smallest target lies between two rungs."""
+"""The ladder ends below this error, so that the smallest target lies between two rungs, or where noise hides more."""
 BUDGET = 90e3
 """Milliseconds of rendering for all rungs of a peer; a rung that would exceed it is not started."""
 QUICK = 5e3
@@ -48,7 +48,7 @@ class Course:
     @property
     def bounces(self) -> int:
         """Bounces of indirect light."""
-        return int(self.scene.render.set.get("vpl.bounces", 1))
+        return find_bounces(self.scene)
 
     def key(self, peer: str, spp: int, seed: int) -> PeerKey:
         """Return the key of a point."""
@@ -117,11 +117,11 @@ def _measure(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
             bar.advance(point.ms)
             return point
 
-        yield from climb(measure, course.seeds)
+        yield from climb(measure, course.seeds, course.truth.noise.level(ENOUGH))
 
 
-def climb(measure: Callable[[int, int], PeerPoint], seeds: int) -> Iterator[PeerPoint]:
-    """Yield points of `measure(spp, seed)` until the error is small enough or stalls, or the time is used up."""
+def climb(measure: Callable[[int, int], PeerPoint], seeds: int, enough: float) -> Iterator[PeerPoint]:
+    """Yield points of `measure(spp, seed)` until the error is `enough` or stalls, or the time is used up."""
     spent, ahead, spp = 0.0, 0.0, 1
     last, stalls = math.inf, 0
     while spp <= MOST_SPP and spent + ahead <= BUDGET and stalls < STALLS:
@@ -132,7 +132,7 @@ def climb(measure: Callable[[int, int], PeerPoint], seeds: int) -> Iterator[Peer
         spent += sum(point.ms for point in rung)
         ahead = 2 * mean(point.ms for point in rung)
         errors = [point.relmse_masked for point in rung if point.relmse_masked is not None]
-        if not errors or mean(errors) <= ENOUGH:
+        if not errors or mean(errors) <= enough:
             return
         stalls = stalls + 1 if mean(errors) > STALLED * last else 0
         last = mean(errors)

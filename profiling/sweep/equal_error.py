@@ -13,6 +13,7 @@ from itertools import pairwise
 from statistics import mean
 from typing import Any
 
+from deferred_ir.profiling.figures import format_ms
 from deferred_ir.profiling.peers.points import PeerPoint
 from deferred_ir.profiling.sweep.groups import Group
 from deferred_ir.truth.reference_noise import ReferenceNoise
@@ -53,7 +54,7 @@ class Reach:
         """Format for a table."""
         if self.ms is None:
             return f"not reached, floor = {self.floor:.2g}"
-        return f"{'at most ' if self.at_most else ''}{self.ms:.3g} ms"
+        return f"{'at most ' if self.at_most else ''}{format_ms(self.ms)}"
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from statistics import mean
 
+from deferred_ir.profiling.figures import format_ms
 from deferred_ir.profiling.sweep.points import Point
 from deferred_ir.truth.reference_noise import ReferenceNoise
 
@@ -93,7 +94,7 @@ def advise(groups: Sequence[Group], size: Sequence[int], budget: float = BUDGET)
     if not groups:
         return "No recommendation: the time of a frame that retains samples of earlier ones is not that of an image."
     within = [group for group in groups if group.frame_ms <= budget]
-    for_budget = f"{budget:.4g} ms at {size[0]}x{size[1]}"
+    for_budget = f"{format_ms(budget)} at {size[0]}x{size[1]}"
     if within:
         least = min(group.level for group in within)
         # The fastest of the choices that are as good as the best, rounding aside.
@@ -110,4 +111,4 @@ def advise(groups: Sequence[Group], size: Sequence[int], budget: float = BUDGET)
         share = "unknown" if noise.relmse is None else f"{noise.relmse / best.relmse:.0%} of that"
         doubt = f"; the noise of the reference is {share}"
     error = noise.quote(best.relmse, 2)
-    return f"{start}{best.graph}, {best.vpls} VPLs, relMSE {error} in {best.frame_ms:.3g} ms{doubt}."
+    return f"{start}{best.graph}, {best.vpls} VPLs, relMSE {error} in {format_ms(best.frame_ms)}{doubt}."

@@ -97,22 +97,29 @@ def read(path: Path, scene: Scene, size: tuple[int, int], time: float = 0.0) -> 
     return Truth(radiance, metadata, str(path))
 
 
+def load(folder: Path, scene: Scene, size: tuple[int, int], sweep: Mapping[str, Any]) -> Truth | None:
+    """Load the reference in `folder` if it was found good enough for `sweep`, see `load_or_trace`."""
+    truth = _load(folder, scene, size, find_bounces(scene))
+    return truth if truth and truth.metadata.get("sweep") == sweep else None
+
+
 def load_or_trace(
     folder: Path,
     scene: Scene,
     size: tuple[int, int],
     sweep: Mapping[str, Any],
     *,
+    most_spp: int = MOST_SPP,
     images: Callable[[], Sequence[Array]],
     bar: ProgressBar,
 ) -> Truth:
     """Load the reference in `folder`, or trace one: paths are doubled until its noise is a tenth of the errors.
 
     sweep: identifies the images that decide how good it has to be; it is saved with the reference, which is used as it
-    is if the next run names the same. images: renders those images, whose errors are likely to be the smallest. bar:
-    shows how far the paths are.
+    is if the next run names the same. most_spp: paths a pixel at most. images: renders those images, whose errors are
+    likely to be the smallest. bar: shows how far the paths are.
     """
-    bounces = int(scene.render.set.get("vpl.bounces", 1))
+    bounces = find_bounces(scene)
     truth = _load(folder, scene, size, bounces)
     if truth and truth.metadata.get("sweep") == sweep:
         return truth
@@ -123,7 +130,7 @@ def load_or_trace(
     while True:
         smallest = min(relmse(image, truth.radiance, truth.hit)[0] for image in probes)
         spp = int(truth.metadata["spp"])
-        if (truth.noise.relmse or 0.0) * MARGIN <= reference_noise.MOST * smallest or 2 * spp > MOST_SPP:
+        if (truth.noise.relmse or 0.0) * MARGIN <= reference_noise.MOST * smallest or 2 * spp > most_spp:
             break
         # Double the paths. The seed is new: all seeds before were smaller.
         truth = _mean(truth, _trace(scene, size, spp, bounces, seed=spp, bar=bar))
@@ -131,6 +138,11 @@ def load_or_trace(
     truth = Truth(truth.radiance, {**truth.metadata, "sweep": dict(sweep)})
     _save(folder, truth)
     return truth
+
+
+def find_bounces(scene: Scene) -> int:
+    """Return the bounces of indirect light that the scene file asks for, 1 unless it does."""
+    return int(scene.render.set.get("vpl.bounces", 1))
 
 
 def _trace(scene: Scene, size: tuple[int, int], spp: int, bounces: int, *, seed: int, bar: ProgressBar) -> Truth:

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from deferred_ir.base.arrays import Array
 from deferred_ir.base.progress import progress_bar
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.profiling.measure import name_device
 from deferred_ir.profiling.peers import ladder
 from deferred_ir.profiling.peers.points import Peers
-from deferred_ir.profiling.sweep import edge_mask, measure_point, points, reference
+from deferred_ir.profiling.sweep import costs, edge_mask, measure_point, points, reference
 from deferred_ir.profiling.sweep.edge_mask import Mask
 from deferred_ir.profiling.sweep.measure_point import Setup
 from deferred_ir.profiling.sweep.points import Point
 from deferred_ir.profiling.sweep.reference import Truth
 from deferred_ir.profiling.sweep.sweep import Sweep, Task
 from deferred_ir.report.origin import Origin
-
-OVERHEAD = 16
-"""Cost of a frame besides its VPLs, in VPLs: weighs the points for the time left on the progress bar."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,21 +31,41 @@ class Results:
 
 
 def run(sweep: Sweep, folder: Path, given: Path | None, origin: Origin) -> Results:
-    """Measure what is not in `folder` yet. Returns all points of the sweep's shard.
+    """Measure what is not in `folder` yet, after saying how long that takes. Returns all points of the sweep's shard.
 
     given: a reference image to use. origin: this run, saved with what it measures.
     """
     truth = reference.read(given, sweep.scene, sweep.size, sweep.time) if given else None
     device = name_device(sweep.device)
     points.make_folder(folder)
-    if truth is None:
-        truth = _load_or_trace(sweep, folder, device)
-    with progress_bar("edges") as bar:
-        mask = edge_mask.load_or_find(folder, sweep.moment, sweep.size, bar.show)
+    # All shards name the same graphs, so they agree on a reference.
+    hashes = [sweep.graph_hash(graph, max(sweep.vpls)) for graph in sweep.graphs]
+    deciding = {"graphs": hashes, "device": device, "most_spp": sweep.most_spp}
+    truth = truth or reference.load(folder, sweep.moment, sweep.size, deciding)
     done, ahead = _find_points(sweep, folder, truth, device)
     if done:
         print(f"{len(done)} of {len(done) + len(ahead)} points are there already", file=sys.stderr)
-    done += _measure(Setup(sweep, folder, origin, truth, mask), ahead)
+    seconds: dict[Task, float] = {}
+    if ahead:
+        graphs = dict.fromkeys(graph for graph, _, _ in ahead) if truth else sweep.graphs
+        trials = costs.try_graphs(sweep, list(graphs))
+        seconds = costs.estimate_points(trials, ahead)
+        print(_announce(sweep, folder, seconds, traces=truth is None), file=sys.stderr)
+    if truth is None:
+        with progress_bar() as bar:
+            truth = reference.load_or_trace(
+                folder,
+                sweep.moment,
+                sweep.size,
+                deciding,
+                most_spp=sweep.most_spp,
+                images=lambda: [trial.image for trial in trials.values()],
+                bar=bar,
+            )
+        done, ahead = _find_points(sweep, folder, truth, device)
+    with progress_bar("edges") as bar:
+        mask = edge_mask.load_or_find(folder, sweep.moment, sweep.size, bar.show)
+    done += _measure(Setup(sweep, folder, origin, truth, mask), {task: seconds[task] for task in ahead})
     peers = Peers()
     if sweep.peers and sweep.shard[0] == 1:
         course = ladder.Course(sweep.moment, sweep.size, sweep.seeds, truth, mask, origin)
@@ -57,34 +73,31 @@ def run(sweep: Sweep, folder: Path, given: Path | None, origin: Origin) -> Resul
     return Results(points.sort(done), peers, mask)
 
 
-def _load_or_trace(sweep: Sweep, folder: Path, device: str) -> Truth:
-    """Return a reference that is good enough for the best images of the sweep."""
-    # All shards name the same graphs, so they agree on a reference.
-    deciding = {"graphs": [sweep.graph_hash(graph, max(sweep.vpls)) for graph in sweep.graphs], "device": device}
-    with progress_bar() as bar:
-
-        def images() -> list[Array]:
-            bar.print("rendering each graph once, to see how many paths the reference needs", sys.stderr)
-            return _probe(sweep)
-
-        return reference.load_or_trace(folder, sweep.moment, sweep.size, deciding, images=images, bar=bar)
-
-
-def _probe(sweep: Sweep) -> list[Array]:
-    """Render an image of each graph with the most VPLs, whose errors are likely to be the smallest."""
-    images = []
-    for graph in sweep.graphs:
-        with Renderer(sweep.size, graph, sweep.device, set=sweep.settings) as renderer:
-            plan = renderer.plan(sweep.scene, max(sweep.vpls), ["radiance"])
-            for time in sweep.frame_times(plan):
-                renderer.draw(sweep.scene, plan, time=time)
-            images.append(renderer.read(plan).radiance)
-    return images
+def _announce(sweep: Sweep, folder: Path, points_ahead: Mapping[Task, float], *, traces: bool) -> str:
+    """Say how long the sweep takes and what takes it. points_ahead: seconds. traces: whether a reference is traced."""
+    scene, size = sweep.moment, sweep.size
+    parts = {f"{len(points_ahead)} points": (sum(points_ahead.values()),) * 2}
+    if traces:
+        path = costs.estimate_paths(scene, size, reference.find_bounces(scene))
+        spp = reference.FIRST_SPP, sweep.most_spp
+        parts[f"a reference of {spp[0]} to {spp[1]} paths a pixel"] = path * spp[0], path * spp[1]
+    if edge_mask.read(folder, scene.hash, size) is None:
+        parts["edges"] = (costs.estimate_edges(scene, size),) * 2
+    whole = costs.format_range(*(sum(bounds) for bounds in zip(*parts.values(), strict=True)))
+    text = f"this takes about {whole}: " + ", ".join(
+        f"{name} {costs.format_range(*bounds)}" for name, bounds in parts.items()
+    )
+    if sweep.peers and sweep.shard[0] == 1:
+        most = costs.format_time(ladder.BUDGET / 1e3)
+        text += f"; then for each peer that is installed at most about {most}"
+    return text
 
 
-def _find_points(sweep: Sweep, folder: Path, truth: Truth, device: str) -> tuple[list[Point], list[Task]]:
+def _find_points(sweep: Sweep, folder: Path, truth: Truth | None, device: str) -> tuple[list[Point], list[Task]]:
     """Return the points in `folder` that were compared with this reference on this device, and the other tasks."""
     done, ahead = list[Point](), list[Task]()
+    if truth is None:
+        return done, sweep.tasks()
     truth_hash = truth.hash
     for task in sweep.tasks():
         point = points.read(folder, sweep.key(*task).name)
@@ -95,13 +108,16 @@ def _find_points(sweep: Sweep, folder: Path, truth: Truth, device: str) -> tuple
     return done, ahead
 
 
-def _measure(setup: Setup, tasks: Sequence[Task]) -> Iterator[Point]:
-    """Measure and save points, with a progress bar."""
+def _measure(setup: Setup, tasks: Mapping[Task, float]) -> Iterator[Point]:
+    """Measure and save points, with a progress bar. tasks: the seconds that each is likely to take."""
     sweep = setup.sweep
-    with progress_bar(total=sum(vpls + OVERHEAD for _, vpls, _ in tasks)) as bar:
+    with progress_bar(total=sum(tasks.values())) as bar:
         for graph in dict.fromkeys(graph for graph, _, _ in tasks):
             with Renderer(sweep.size, graph, sweep.device, set=sweep.settings) as renderer:
-                for _, vpls, seed in (task for task in tasks if task[0] == graph):
+                for task, seconds in tasks.items():
+                    name, vpls, seed = task
+                    if name != graph:
+                        continue
                     bar.label(f"{graph}, {vpls} VPLs, seed {seed}")
                     yield measure_point.measure(setup, renderer, graph, sweep.key(graph, vpls, seed))
-                    bar.advance(vpls + OVERHEAD)
+                    bar.advance(seconds)

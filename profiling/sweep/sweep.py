@@ -12,6 +12,7 @@ from deferred_ir.engine.settings import choose_settings
 from deferred_ir.graph.file import graph_hash, load_graph
 from deferred_ir.graph.graph import Plan
 from deferred_ir.profiling.sweep.points import Key
+from deferred_ir.profiling.sweep.reference import MOST_SPP
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.scene.scene import Scene
 
@@ -27,7 +28,8 @@ class Sweep:
     """The points to measure. size: (width, height). shard: (i, n), the i-th of n parts, from 1. peers: their names.
 
     The first shard measures the peers. time: seconds; where something moves, the frames end there and errors are of
-    that time. Raises SettingError or GraphError if there is nothing to measure, or a graph cannot be compared.
+    that time. most_spp: most paths a pixel of a reference that is traced. Raises SettingError or GraphError if there is
+    nothing to measure, or a graph cannot be compared.
     """
 
     scene: Scene
@@ -39,6 +41,7 @@ class Sweep:
     shard: tuple[int, int] = (1, 1)
     peers: Sequence[str] = ()
     time: float = 0.0
+    most_spp: int = MOST_SPP
     _hashes: dict[tuple[str, int], str] = field(default_factory=dict, init=False, repr=False)
     """Hashes of graphs by their names and numbers of VPLs."""
 

@@ -207,14 +207,14 @@ def test_a_peer_that_fails_gets_a_line_and_the_others_go_on(folder, fake, capsys
     fake.fails_at.update(mitsuba=0, cycles=0)  # nothing is left of them
     for path in files(folder):
         path.unlink()
-    assert profile(folder) == 0
+    assert profile(folder, "--peers", "mitsuba,cycles") == 0
     assert told(folder)["peers"] == []
     assert len(told(folder)["peer_notes"]) == 2
 
 
 def test_a_peer_that_is_not_installed_gets_a_line(folder, fake, capsys, monkeypatch):
     monkeypatch.setattr(fake_peer, "available", lambda: "fake is not installed")
-    assert profile(folder) == 0
+    assert profile(folder, "--peers", "mitsuba,cycles") == 0
     line = "peer mitsuba: fake is not installed; pip install fake-renderer"
     assert f"note: {line}" in capsys.readouterr().err.splitlines()
     page = (folder / "report.html").read_text()
@@ -294,7 +294,7 @@ def climbed(ms_a_path, error_of_one, seeds=3):
         error = None if error_of_one is None else error_of_one / spp
         return point(spp, seed, ms_a_path * spp, error)
 
-    return [(made.key.spp, made.key.seed) for made in ladder.climb(measure, seeds)]
+    return [(made.key.spp, made.key.seed) for made in ladder.climb(measure, seeds, ladder.ENOUGH)]
 
 
 def test_the_ladder_ends_below_the_least_error_that_is_asked_for():
@@ -314,7 +314,7 @@ def test_the_ladder_ends_with_its_time_and_slow_rungs_have_one_seed():
 
 def test_the_ladder_ends_where_the_error_falls_no_longer():
     errors = {1: 0.4, 2: 0.5, 4: 0.2, 8: 0.199, 16: 0.1, 32: 0.0999, 64: 0.0998}
-    made = ladder.climb(lambda spp, seed: point(spp, seed, 1.0, errors[spp]), 1)
+    made = ladder.climb(lambda spp, seed: point(spp, seed, 1.0, errors[spp]), 1, ladder.ENOUGH)
     assert [one.key.spp for one in made] == list(errors)
 
 

@@ -13,9 +13,12 @@ from importlib import import_module
 import numpy as np
 import pytest
 
+from deferred_ir.base.errors import SettingError
 from deferred_ir.cli.main import main
+from deferred_ir.graph.file import graph_names
 from deferred_ir.truth.reference_noise import ReferenceNoise
 
+costs = import_module("deferred_ir.profiling.sweep.costs")
 measure_point = import_module("deferred_ir.profiling.sweep.measure_point")
 sweep_points = import_module("deferred_ir.profiling.sweep.points")
 groups = import_module("deferred_ir.profiling.sweep.groups")
@@ -258,11 +261,86 @@ def test_ctrl_c_saves_finished_points(whole, tmp_path, capsys, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(measure_point, "measure", interrupted)
         assert profile(tmp_path) == 130
-    assert capsys.readouterr().err == "deferred-ir: interrupted\n"
+    estimate, interrupted = capsys.readouterr().err.splitlines()
+    assert estimate.startswith("this takes about ")
+    assert interrupted == "deferred-ir: interrupted"
     assert len(points(tmp_path)) == 3
     assert profile(tmp_path) == 0
     assert "3 of 8 points are there already" in capsys.readouterr().err
     assert len(table(tmp_path)) == 8
+
+
+def test_how_long_it_takes_is_said_before_what_takes_it(whole, copied, tmp_path, capsys):
+    """Of points, of the reference unless there is one, of the edges unless they are known."""
+    size = r"[\d.]+ (s|min|h)( to [\d.]+ (s|min|h))?|\d+ to \d+ (s|min)"
+    assert profile(copied) == 0
+    assert "this takes" not in capsys.readouterr().err
+    for path in points(copied)[:2]:
+        path.unlink()
+    assert profile(copied) == 0
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("this")]
+    assert re.fullmatch(rf"this takes about ({size}): 2 points ({size})", line)
+    given = ["--reference", str(whole / "reference.npy"), "--shard", "1/8"]
+    assert profile(tmp_path, *given) == 0
+    assert re.search(rf": 1 points ({size}), edges ({size})$", capsys.readouterr().err.splitlines()[0])
+    for path in (tmp_path / "mask.npy", *points(tmp_path)):
+        path.unlink()
+    assert profile(tmp_path, "--shard", "1/8") == 0
+    assert "a reference of 256 to 1024 paths a pixel" in capsys.readouterr().err.splitlines()[0]
+
+
+def test_a_point_is_estimated_from_the_time_of_frames_between_the_fewest_and_the_most_vpls():
+    trial = costs.Trial(np.ones((4, 4, 3)), 2.0, {16: 0.1, 64: 0.4}, frames=9)
+    found = costs.estimate_points({"a": trial}, [("a", 16, 0), ("a", 32, 0), ("a", 64, 0)])
+    first, between, last = found.values()
+    assert between - 10 * 0.2 == pytest.approx(last - 10 * 0.4)  # what comparing takes
+    assert first - 10 * 0.1 == pytest.approx(between - 10 * 0.2 + 2.0)
+    one = costs.Trial(np.ones((4, 4, 3)), 0.0, {64: 0.4}, frames=9)
+    assert one.estimate_point(64) == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "text"),
+    [((0.1, 0.2), "1 s"), ((8, 43), "8 to 43 s"), ((80, 260), "80 s to 4 min"), ((5000, 9000), "83 min to 2.5 h")],
+)
+def test_times_are_told_as_a_person_would(bounds, text):
+    assert costs.format_range(*bounds) == text
+
+
+def test_the_budget_is_that_of_the_advice(copied, capsys):
+    assert profile(copied, "--budget", "99s") == 0
+    assert capsys.readouterr().out.startswith("For 99 s at 32x32: ")
+    assert profile(copied, "--budget", "0.001ms") == 0
+    assert capsys.readouterr().out.startswith("Nothing here takes 0.001 ms at 32x32 or less; ")
+    assert "Nothing here takes 0.001 ms" in (copied / "report.html").read_text()
+
+
+def test_the_quick_default_is_small_and_the_thorough_one_is_that_of_a_render(monkeypatch, tmp_path):
+    made = []
+
+    def stop(sweep, *_):
+        made.append(sweep)
+        raise SettingError("enough")
+
+    monkeypatch.setattr(import_module("deferred_ir.profiling.sweep.run"), "run", stop)
+    for extra in ([], ["--thorough"], ["--thorough", "--vpls", "8", "--peers", "none"], ["--size", "300x200"]):
+        assert main(["profile", "cornell", "-o", str(tmp_path), *extra]) == 2
+    quick, thorough, named, sized = made
+    assert (quick.size, quick.seeds, quick.vpls, quick.peers) == ((128, 128), 1, [16, 64], ())
+    assert set(quick.graphs) < set(graph_names()) == set(thorough.graphs)
+    assert (thorough.size, thorough.seeds, thorough.vpls) == ((512, 512), 3, [16, 64, 256])
+    assert thorough.most_spp > quick.most_spp
+    assert thorough.peers
+    assert (named.vpls, named.seeds, named.peers) == ([8], 3, ())
+    assert (sized.size, sized.most_spp) == ((300, 200), quick.most_spp)
+
+
+def test_the_quick_size_keeps_the_proportions_of_the_scenes():
+    command = import_module("deferred_ir.cli.commands.profile")
+    scene = import_module("deferred_ir.scene.scene")
+    for size, expected in (((1600, 400), (256, 64)), ((64, 64), (64, 64))):
+        assert command._choose_size(None, scene.RenderDefaults(size=size), command.QUICK) == expected
+        assert command._choose_size(None, scene.RenderDefaults(size=size), command.THOROUGH) == size
 
 
 def test_shards_merge_to_the_table_of_the_whole(whole, tmp_path, measured):

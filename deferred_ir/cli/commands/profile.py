@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from deferred_ir.cli.options import (
     add_size,
     parse_count,
     parse_counts,
+    parse_duration,
     parse_seconds,
     print_notes,
     split_list,
@@ -22,13 +24,35 @@ from deferred_ir.cli.options import (
 
 if TYPE_CHECKING:
     from deferred_ir.profiling.sweep.run import Results
+    from deferred_ir.scene.scene import RenderDefaults
 
 HELP = "Measure error against run time: graphs x numbers of VPLs x seeds."
 ORDER = 40
-VPLS = "16,64,256"
-SEEDS = 3
 LAST = 1.0
 """Seconds: the time of the last frame, and of the reference, where something moves."""
+BUDGET = 0.05
+"""Seconds a frame for which settings are recommended."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What is measured unless options say otherwise.
+
+    graphs: None: all that are built in. pixels: images have no more of them, None: as many as in a render. spp: most
+    paths a pixel of the reference. peers: whether those that are installed are measured.
+    """
+
+    graphs: str | None
+    vpls: str
+    seeds: int
+    pixels: int | None
+    spp: int
+    peers: bool
+
+
+QUICK = Effort("deferred,interleaved,accurate,resampled", "16,64", 1, 128 * 128, 1024, False)
+"""Under a minute on two cores without a GPU, for the built-in scenes."""
+THOROUGH = Effort(None, "16,64,256", 3, None, 4096, True)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -36,15 +60,21 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", nargs="?", metavar="SCENE", help=SCENE)
     parser.add_argument("--merge", nargs="+", metavar="DIR", help="instead: join the points of these folders")
     parser.add_argument("-o", "--output", required=True, metavar="DIR", help="folder for points, tables and report")
-    parser.add_argument("--graphs", metavar="A,B", help="names or files (default: all built-in graphs)")
-    parser.add_argument("--vpls", metavar="N,N", help=f"numbers of virtual point lights (default: {VPLS})")
-    parser.add_argument("--seeds", type=parse_count, metavar="K", help=f"seeds 0 to K-1 (default: {SEEDS})")
-    add_size(parser)
+    parser.add_argument("--graphs", metavar="A,B", help=f"names or files (default: {QUICK.graphs})")
+    vpls = f"numbers of virtual point lights (default: {QUICK.vpls})"
+    parser.add_argument("--vpls", metavar="N,N", help=vpls)
+    parser.add_argument("--seeds", type=parse_count, metavar="K", help=f"seeds 0 to K-1 (default: {QUICK.seeds})")
+    add_size(parser, default="128x128")
+    more = f"--vpls {THOROUGH.vpls} --seeds {THOROUGH.seeds} --size 512x512"
+    thorough = f"other defaults: all built-in graphs, {more}, peers, a better reference"
+    parser.add_argument("--thorough", action="store_true", default=None, help=thorough)
+    budget = "recommend settings for frames of T, such as 200ms or 0.2s (default: 50ms)"
+    parser.add_argument("--budget", type=parse_duration, default=BUDGET, metavar="T", help=budget)
     parser.add_argument("--reference", metavar="R.npy", help="with R.json beside it (default: one is traced)")
     time = "where something moves: the frames end at T seconds, where the reference is (default: 1)"
     parser.add_argument("--time", type=parse_seconds, metavar="T", help=time)
     parser.add_argument("--shard", metavar="I/N", help="measure the I-th of N parts only")
-    peers = "other renderers to compare: mitsuba, cycles (default: all that are installed)"
+    peers = "other renderers to compare: mitsuba, cycles (default: none; with --thorough all that are installed)"
     parser.add_argument("--peers", metavar="A,B|none", help=peers)
     add_device(parser)
 
@@ -56,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     report.check_libraries()
     folder = Path(arguments.output)
     results = _merge(arguments, folder) if arguments.merge else _measure(arguments, folder)
-    print(report.write_all(folder, results))
+    print(report.write_all(folder, results, 1e3 * arguments.budget))
     print(folder / "report.html", file=sys.stderr)
     return 0
 
@@ -65,7 +95,7 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> Results:
     """Run the sweep."""
     if arguments.scene is None:
         raise SettingError("profile: wants a SCENE to measure, or --merge DIR...")
-    from deferred_ir.engine.settings import choose_size, list_notes
+    from deferred_ir.engine.settings import list_notes
     from deferred_ir.graph.file import graph_names
     from deferred_ir.loading.load import load
     from deferred_ir.profiling.peers import ladder
@@ -73,15 +103,18 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> Results:
     from deferred_ir.profiling.sweep.sweep import Sweep
     from deferred_ir.report.origin import describe_run
 
-    counts = _parse_vpls(VPLS if arguments.vpls is None else arguments.vpls)
+    effort = THOROUGH if arguments.thorough else QUICK
+    counts = _parse_vpls(effort.vpls if arguments.vpls is None else arguments.vpls)
     shard = _parse_shard(arguments.shard)
-    peers = ladder.choose(arguments.peers)
-    graphs = graph_names() if arguments.graphs is None else split_list(arguments.graphs)
+    peers = ladder.choose(arguments.peers) if arguments.peers is not None or effort.peers else ()
+    names = effort.graphs if arguments.graphs is None else arguments.graphs
+    graphs = graph_names() if names is None else split_list(names)
     scene = load(arguments.scene)
-    size = choose_size(arguments.size, scene.render)
-    seeds = SEEDS if arguments.seeds is None else arguments.seeds
+    size = _choose_size(arguments.size, scene.render, effort)
+    seeds = effort.seeds if arguments.seeds is None else arguments.seeds
     time = LAST if arguments.time is None else arguments.time
-    what = Sweep(scene, size, graphs, counts, seeds, arguments.device, shard, peers, time if scene.moves else 0.0)
+    time = time if scene.moves else 0.0
+    what = Sweep(scene, size, graphs, counts, seeds, arguments.device, shard, peers, time, effort.spp)
     print_notes(list_notes(scene))
     given = Path(arguments.reference) if arguments.reference else None
     return run_sweep(what, folder, given, describe_run(arguments.command_line))
@@ -89,7 +122,7 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> Results:
 
 def _merge(arguments: argparse.Namespace, folder: Path) -> Results:
     """Join the points of the shards that --merge names."""
-    without = ("graphs", "vpls", "seeds", "size", "reference", "shard", "peers", "time", "scene")
+    without = ("graphs", "vpls", "seeds", "size", "reference", "shard", "peers", "time", "thorough", "scene")
     extra = [name for name in without if getattr(arguments, name) is not None]
     if extra:
         what = "a SCENE" if extra[0] == "scene" else f"--{extra[0]}"
@@ -105,9 +138,20 @@ def _merge(arguments: argparse.Namespace, folder: Path) -> Results:
     return results
 
 
+def _choose_size(text: str | None, defaults: RenderDefaults, effort: Effort) -> tuple[int, int]:
+    """Return (width, height): --size, else a render's, reduced in proportion to the pixels of `effort`."""
+    from deferred_ir.engine.settings import choose_size
+
+    width, height = choose_size(text, defaults)
+    if text is not None or effort.pixels is None or width * height <= effort.pixels:
+        return width, height
+    scale = (effort.pixels / (width * height)) ** 0.5
+    return max(round(width * scale), 1), max(round(height * scale), 1)
+
+
 def _parse_vpls(text: str) -> list[int]:
     """Read --vpls; none at all is a fault that the sweep reports."""
-    return parse_counts("--vpls", text, VPLS) if text.strip(", ") else []
+    return parse_counts("--vpls", text, THOROUGH.vpls) if text.strip(", ") else []
 
 
 def _parse_shard(text: str | None) -> tuple[int, int]:

@@ -60,7 +60,7 @@ def progress_bar(
     """Open a bar with the time spent and the time left.
 
     unit: counts the work in these, such as "frame"; without it only a percentage is shown. leave: the finished bar
-    stays on the terminal. at_most: the work may end before `total`, so the time left is an upper bound.
+    stays on the terminal. at_most: the work may end long before `total`, so no time left is shown; wants a `unit`.
     """
     if not sys.stderr.isatty():
         yield ProgressBar(None)
@@ -68,8 +68,9 @@ def progress_bar(
     from tqdm import tqdm
 
     count = f"{{n_fmt}}/{{total_fmt}} {unit}s, " if unit else ""
-    left = "at most {remaining} left" if at_most else "{remaining} left"
-    style = f"{{desc}}{{percentage:3.0f}} % |{{bar}}| {count}{{elapsed}}, {left}"
+    style = f"{{desc}}{{percentage:3.0f}} % |{{bar}}| {count}{{elapsed}}, {{remaining}} left"
+    if at_most:
+        style = f"{{desc}}{{n:.0f}} of at most {{total:.0f}} {unit}s |{{bar}}| {{elapsed}}"
     desc = f"{label}: " if label else ""
     with tqdm(total=total, desc=desc, bar_format=style, leave=leave, file=sys.stderr) as bar:
         yield ProgressBar(bar)

@@ -98,7 +98,7 @@ def _measure(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
     log = peer_points.make_folder(folder) / f"{name}.log"
     with (
         ExitStack() as stack,
-        progress_bar(total=BUDGET, at_most=True) as bar,
+        progress_bar(total=BUDGET / 1e3, unit="second", at_most=True) as bar,
     ):
         process: peer_process.PeerProcess | None = None
 
@@ -114,7 +114,7 @@ def _measure(course: Course, folder: Path, name: str) -> Iterator[PeerPoint]:
                     )
                 point = _render_point(course, key, process)
                 peer_points.save(folder, point)
-            bar.advance(point.ms)
+            bar.advance(point.ms / 1e3)
             return point
 
         yield from climb(measure, course.seeds, course.truth.noise.level(ENOUGH))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from deferred_ir.base.arrays import Array
-from deferred_ir.base.progress import track
+from deferred_ir.base.progress import progress_bar
 from deferred_ir.engine.renderer import IMAGES, Renderer
 from deferred_ir.profiling.sweep import edge_mask
 from deferred_ir.profiling.sweep.sweep import FRAMES, Sweep, Task
@@ -19,6 +19,8 @@ PATHS = 32
 """Paths a pixel whose time is measured, of an image of a quarter of the pixels."""
 PART = 4
 """The edges of an image of 1 / PART of the width and height are found, to know how long all take."""
+TINY = 4, 4
+"""An image of this size takes only what does not depend on the size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,12 @@ class Trial:
 
 def try_graphs(sweep: Sweep, graphs: Sequence[str]) -> dict[str, Trial]:
     """Draw a few frames with each graph, with a progress bar."""
-    return {graph: _try_graph(sweep, graph) for graph in track(graphs, "a few frames of each graph")}
+    trials: dict[str, Trial] = {}
+    with progress_bar("a few frames of each graph", len(graphs)) as bar:
+        for graph in graphs:
+            trials[graph] = _try_graph(sweep, graph)
+            bar.advance()
+    return trials
 
 
 def _try_graph(sweep: Sweep, graph: str) -> Trial:
@@ -84,18 +91,29 @@ def _time_comparison(image: Array) -> float:
 
 def estimate_paths(scene: Scene, size: tuple[int, int], bounces: int) -> float:
     """Return the seconds that one path for each pixel of an image of `size` takes."""
-    small = max(size[0] // 2, 1), max(size[1] // 2, 1)
-    start = clock.perf_counter()
-    trace_reference(scene, small, spp=PATHS, bounces=bounces)
-    return (clock.perf_counter() - start) / PATHS * (size[0] * size[1]) / (small[0] * small[1])
+    small = max(size[0] // 2, TINY[0]), max(size[1] // 2, TINY[1])
+    seconds = _time_pixel(lambda pixels: trace_reference(scene, pixels, spp=PATHS, bounces=bounces), small)
+    return seconds / PATHS * _area(size)
 
 
 def estimate_edges(scene: Scene, size: tuple[int, int]) -> float:
     """Return the seconds that finding the edges of an image of `size` takes."""
-    small = max(size[0] // PART, 1), max(size[1] // PART, 1)
-    start = clock.perf_counter()
-    edge_mask.find(scene, small)
-    return (clock.perf_counter() - start) * (size[0] * size[1]) / (small[0] * small[1])
+    small = max(size[0] // PART, TINY[0]), max(size[1] // PART, TINY[1])
+    return _time_pixel(lambda pixels: edge_mask.find(scene, pixels), small) * _area(size)
+
+
+def _time_pixel(work: Callable[[tuple[int, int]], object], size: tuple[int, int]) -> float:
+    """Return the seconds of `work` for each pixel of an image of `size`, without what takes as long for a TINY one."""
+    seconds = []
+    for pixels in (TINY, size):
+        start = clock.perf_counter()
+        work(pixels)
+        seconds.append(clock.perf_counter() - start)
+    return max(seconds[1] - seconds[0], 0.0) / _area(size)
+
+
+def _area(size: tuple[int, int]) -> int:
+    return size[0] * size[1]
 
 
 def format_time(seconds: float) -> str:

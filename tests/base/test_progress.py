@@ -34,11 +34,18 @@ def test_a_bar_shows_label_count_and_time_left(capsys, monkeypatch):
 
 def test_less_work_done_starts_the_bar_again(capsys, monkeypatch):
     pretend_terminal(monkeypatch)
-    with progress_bar(leave=True, at_most=True) as bar:
+    with progress_bar(leave=True) as bar:
         for done, total in ((5, 10), (10, 10), (2, 8), (4, 8)):
             bar.show(done, total)
-    assert "50 % |" in (err := capsys.readouterr().err)
-    assert "at most" in err
+    assert "50 % |" in capsys.readouterr().err
+
+
+def test_work_that_may_end_early_shows_how_much_there_is_and_no_time_left(capsys, monkeypatch):
+    pretend_terminal(monkeypatch)
+    with progress_bar("peer", 90.0, leave=True, unit="second", at_most=True) as bar:
+        bar.advance(12.3)
+    assert "peer: 12 of at most 90 seconds |" in (err := capsys.readouterr().err)
+    assert "left" not in err
 
 
 def test_tracked_items_come_in_order(capsys, monkeypatch):

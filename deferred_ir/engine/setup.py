@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from deferred_ir.base.errors import GraphError
 from deferred_ir.engine.settings import set_vpls
 from deferred_ir.graph.file import load_graph
 from deferred_ir.graph.graph import Graph, Plan
@@ -29,10 +30,16 @@ class Setup:
     plans: dict[Any, Plan] = field(default_factory=dict)
 
     def graph(self, vpls: int | None = None) -> Graph:
-        """Return the graph with this number of VPLs, None for its own, loading it when first asked for."""
+        """Return the graph with this number of VPLs, None for its own, loading it when first asked for.
+
+        Raises GraphError, also where a pass cannot run on this machine.
+        """
         if vpls not in self.graphs:
             count = {} if vpls is None else set_vpls(self.graph(), vpls)
-            self.graphs[vpls] = load_graph(self.name, {**self.set, **count}, self.passes)
+            graph = load_graph(self.name, {**self.set, **count}, self.passes)
+            if obstacle := graph.find_obstacle():
+                raise GraphError(obstacle)
+            self.graphs[vpls] = graph
         return self.graphs[vpls]
 
     def resize(self, size: tuple[int, int]) -> Setup:

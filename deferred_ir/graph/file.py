@@ -34,6 +34,12 @@ def graph_names() -> list[str]:
     return sorted(path.stem for path in _graphs_folder().glob("*.toml"))
 
 
+def find_obstacles() -> dict[str, str]:
+    """Return why built-in graphs cannot run on this machine, and the mend, by the names of those that cannot."""
+    found = {name: load_graph(name).find_obstacle() for name in graph_names()}
+    return {name: obstacle for name, obstacle in found.items() if obstacle}
+
+
 def load_graph(
     name: str | Path,
     settings: Mapping[str, Any] | None = None,

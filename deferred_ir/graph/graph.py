@@ -31,6 +31,11 @@ class Graph:
     outputs: Mapping[str, str]
     origin: str = "graph"
 
+    def find_obstacle(self) -> str | None:
+        """Return why a pass cannot run on this machine, and the mend, in a line; None if all can."""
+        found = ((node.name, node.work.find_obstacle()) for node in self.nodes.values())
+        return next((f"{self.origin}: {name}: {obstacle}" for name, obstacle in found if obstacle), None)
+
 
 @dataclass(frozen=True)
 class Step:

@@ -59,6 +59,13 @@ class Pass:
         del facts
         return None
 
+    def find_obstacle(self) -> str | None:
+        """Return why the pass cannot run on this machine, and the mend, in a line; None if it can.
+
+        For what comes with an optional package, say. Asked before anything is drawn.
+        """
+        return None
+
     def depends(self) -> frozenset[str] | None:
         """Return the parts of a frame that the outputs are made of besides parameters and inputs; None: all parts.
 

@@ -29,7 +29,8 @@ class Sweep:
 
     The first shard measures the peers. time: seconds; where something moves, the frames end there and errors are of
     that time. most_spp: most paths a pixel of a reference that is traced. Raises SettingError or GraphError if there is
-    nothing to measure, or a graph cannot be compared.
+    nothing to measure, or a graph cannot run or be
+    compared.
     """
 
     scene: Scene
@@ -51,7 +52,10 @@ class Sweep:
                 raise SettingError(f"{name}: leaves nothing to measure; name one at least")
         names: dict[str, str] = {}
         for graph in self.graphs:
-            if "radiance" not in load_graph(graph, self.settings).outputs:
+            loaded = load_graph(graph, self.settings)
+            if obstacle := loaded.find_obstacle():
+                raise GraphError(obstacle)
+            if "radiance" not in loaded.outputs:
                 raise GraphError(f"{graph}: has no output 'radiance', which is compared with the reference; add it")
             other = names.setdefault(self.graph_hash(graph, max(self.vpls)), graph)
             if other != graph:

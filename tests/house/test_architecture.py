@@ -20,6 +20,7 @@ THIRD_PARTIES = {
     "glcontext": ("gl",),
     "ctypes": ("gl",),
     "embreex": ("rays",),
+    "mitsuba_oidn": ("pool",),
     "trimesh": ("loading",),
     "PIL": ("loading", "output", "truth"),
     "OpenEXR": ("output",),
@@ -90,7 +91,7 @@ def test_every_third_party_import_is_a_declared_dependency():
         f"{name}: {top}"
         for name in MODULES
         for top in third_party(name)
-        if not {distribution.lower() for distribution in distributions.get(top, [top])} & declared
+        if not {distribution.lower() for distribution in distributions.get(top, [top.replace("_", "-")])} & declared
     }
     assert not undeclared
 

@@ -96,7 +96,7 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> Results:
     if arguments.scene is None:
         raise SettingError("profile: wants a SCENE to measure, or --merge DIR...")
     from deferred_ir.engine.settings import list_notes
-    from deferred_ir.graph.file import graph_names
+    from deferred_ir.graph.file import find_obstacles, graph_names
     from deferred_ir.loading.load import load
     from deferred_ir.profiling.peers import ladder
     from deferred_ir.profiling.sweep.run import run as run_sweep
@@ -108,14 +108,15 @@ def _measure(arguments: argparse.Namespace, folder: Path) -> Results:
     shard = _parse_shard(arguments.shard)
     peers = ladder.choose(arguments.peers) if arguments.peers is not None or effort.peers else ()
     names = effort.graphs if arguments.graphs is None else arguments.graphs
-    graphs = graph_names() if names is None else split_list(names)
+    obstacles = find_obstacles() if names is None else {}
+    graphs = [name for name in graph_names() if name not in obstacles] if names is None else split_list(names)
     scene = load(arguments.scene)
     size = _choose_size(arguments.size, scene.render, effort)
     seeds = effort.seeds if arguments.seeds is None else arguments.seeds
     time = LAST if arguments.time is None else arguments.time
     time = time if scene.moves else 0.0
     what = Sweep(scene, size, graphs, counts, seeds, arguments.device, shard, peers, time, effort.spp)
-    print_notes(list_notes(scene))
+    print_notes([*list_notes(scene), *(f"left out: {obstacle}" for obstacle in obstacles.values())])
     given = Path(arguments.reference) if arguments.reference else None
     return run_sweep(what, folder, given, describe_run(arguments.command_line))
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import importlib.util
 import json
 import subprocess
 import sys
@@ -153,12 +154,20 @@ def cases(extra: list[str]) -> Iterator[Case]:
     for scale in (1, 3, 4):
         yield Case("soft", "resampled", {"sample_pixels.scale": scale, "vpl.bounces": 2}, seeds=(0, 1, 1), reuse=True)
     yield Case("cornell", "resampled", {"choose_vpls.rays": 1, "filter_samples.steps": 0, "list_vpls.entries": 64})
+    yield from denoised_cases() if importlib.util.find_spec("mitsuba_oidn") else ()
     for visibility in ("maps", "rays"):
         yield Case("soft", "accurate", {"shadow_rays.visibility": visibility}, seeds=(0, 1, 1))
         yield Case("cornell", "accurate", {"shadow_rays.visibility": visibility, "near_field.samples": 0.5})
     yield Case("light moves", "incremental", {"vpl.most": 16, "vpl.least": 2}, times=times, seeds=(3,))
     yield from (Case("colors", "deferred", {"tonemap.operator": o}) for o in ("reinhard", "none"))
     yield Case("colors", "deferred", {"tonemap.exposure": 1.5})
+
+
+def denoised_cases() -> Iterator[Case]:
+    """List the cases of the graph that needs the extra `denoise`."""
+    for quality in ("fast", "balanced"):
+        yield Case("atrium", "denoised", {"denoise_samples.quality": quality}, seeds=(0, 1, 1), reuse=True)
+    yield Case("all move", "denoised", {"sample_pixels.scale": 1}, times=(0.0, 0.5, 0.5, 1.0))
 
 
 def render(case: Case, folder: Path) -> dict[str, np.ndarray]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import partial
 from math import pi
 
+from deferred_ir.graph.file import find_obstacles
 from deferred_ir.profiling.checks import change_surfaces as surface
 from deferred_ir.profiling.checks import change_triangles as shape
 from deferred_ir.profiling.checks import change_views as change
@@ -177,6 +178,11 @@ MAPS = (
     "slivers of 1e-6",
 )
 TWICE = ("triangles that are points and lines", "each face twice")
+DENOISED = (
+    *_repeat("denoised", *LINEAR[:2], BOX, "0 VPLs", "1 VPLs"),
+    # A choice of a VPL that a rounding flips changes the denoised light of all samples around.
+    replace(NAMED[LINEAR[2]], graph="denoised", bound=4 * MOVED),
+)
 GRAPHS = (
     *_repeat("forward", *LINEAR, BOX, *MAPS, *TWICE),
     *_repeat("hemisphere", *LINEAR, BOX, *MAPS),
@@ -185,6 +191,7 @@ GRAPHS = (
     *_repeat("interleaved", *LINEAR, BOX),
     *_repeat("accurate", *LINEAR, BOX),
     *_repeat("resampled", *LINEAR, BOX, "0 VPLs", "1 VPLs", "light grazing a wall", "slivers of 1e-6", *TWICE[:1]),
+    *(() if "denoised" in find_obstacles() else DENOISED),
     *_repeat("incremental", *LINEAR, BOX),
 )
 """Cases that matter for single maps, paraboloid maps and the passes of other graphs, repeated with those."""

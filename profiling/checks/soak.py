@@ -23,6 +23,7 @@ from typing import Any
 import deferred_ir as ir
 from deferred_ir.base.progress import progress_bar
 from deferred_ir.engine.measurement import Measurement
+from deferred_ir.graph.file import find_obstacles
 from deferred_ir.profiling.figures import markdown
 from deferred_ir.profiling.study import command_line
 from deferred_ir.scene.motion import FRAMES_PER_SECOND, LissajousMotion
@@ -45,6 +46,7 @@ SETTINGS: tuple[dict[str, Any], ...] = (
     {"graph": "accurate", "size": (48, 32), "set": {"vpl.count": 16}},
     {"graph": "resampled", "size": (48, 32), "set": {"vpl.count": 4}},
     {"graph": "forward", "size": (48, 32), "set": {"vpl.count": 4, "shadow_maps.spot_size": 256}},
+    *([] if "denoised" in find_obstacles() else [{"graph": "denoised", "size": (48, 32), "set": {"vpl.count": 4}}]),
 )
 
 ROUND = 2 * len(SETTINGS)

@@ -9,6 +9,7 @@ from small_scenes import build, plane, room, sphere
 
 from deferred_ir.engine.unwritten_reads import unwritten_reads
 from deferred_ir.gl.framebuffers import Framebuffer
+from deferred_ir.graph.file import find_obstacles
 
 SIZE = (40, 28)
 GRAPHS = [
@@ -20,6 +21,7 @@ GRAPHS = [
     "accurate by rays",
     "incremental",
     "resampled",
+    *(["denoised"] if "denoised" not in find_obstacles() else []),
 ]
 SETTINGS = {"vpl.count": 16, "shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 16}
 OPEN = build(plane(), sphere(0.3))
@@ -28,7 +30,7 @@ OPEN = build(plane(), sphere(0.3))
 
 def found(renderer, graph, scene, vpls=16):
     name, *rays = graph.split(" by ")
-    maps = SETTINGS if name != "resampled" else {}
+    maps = SETTINGS if name not in ("resampled", "denoised") else {}
     settings = {**maps, "vpl.count": vpls} | ({"shadow_rays.visibility": "rays"} if rays else {})
     one = renderer(SIZE, name, set=settings)
     return unwritten_reads(one, scene, one.plan(scene))

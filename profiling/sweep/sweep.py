@@ -29,8 +29,7 @@ class Sweep:
 
     The first shard measures the peers. time: seconds; where something moves, the frames end there and errors are of
     that time. most_spp: most paths a pixel of a reference that is traced. Raises SettingError or GraphError if there is
-    nothing to measure, or a graph cannot run or be
-    compared.
+    nothing to measure, or a graph cannot run or be compared.
     """
 
     scene: Scene

@@ -444,7 +444,16 @@ def test_a_faulty_command_is_one_line(extra, words, tmp_path, capsys, monkeypatc
 
 
 def test_a_reference_of_another_scene_or_size_is_refused(whole, tmp_path, capsys):
-    given = ["-o", str(tmp_path / "out"), "--reference", str(whole / "reference.npy"), "--vpls", "4"]
+    given = [
+        "-o",
+        str(tmp_path / "out"),
+        "--reference",
+        str(whole / "reference.npy"),
+        "--vpls",
+        "4",
+        "--graphs",
+        "forward",
+    ]
     line = fault(capsys, "colors", "--size", "32x32", *given)
     assert "shows the scene cornell" in line
     assert "colors" in line

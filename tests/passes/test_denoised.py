@@ -91,13 +91,13 @@ def test_the_unit_of_light_does_not_matter(renderer, factor):
 
 def test_a_change_of_quality_runs_the_denoiser_and_what_follows(renderer):
     one, scene = renderer((32, 24), "denoised", set={"vpl.count": 8}, reuse=True), room()
-    fast = one.render(scene)
-    one.configure(set={"vpl.count": 8, "denoise_samples.quality": "balanced"})
+    balanced = one.render(scene)
+    one.configure(set={"vpl.count": 8, "denoise_samples.quality": "fast"})
     plan = one.plan(scene)
     one.draw(scene, plan)
     ran = {step.name for step in plan.steps} - set(one.executor.skipped)
     assert ran == {"denoise_samples", "blend_samples", "lighting", "tonemap"}
-    assert not same_pixels(fast, one.read(plan))
+    assert not same_pixels(balanced, one.read(plan))
 
 
 def test_without_vpls_nothing_is_denoised(renderer):

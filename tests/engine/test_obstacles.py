@@ -58,11 +58,11 @@ def test_a_sweep_that_names_it_is_refused():
 def test_a_sweep_of_all_graphs_leaves_it_out_and_says_so(monkeypatch, tmp_path, capsys):
     chosen = []
 
-    def note(sweep, folder, reference):
+    def note(sweep, *rest):
         chosen.extend(sweep.graphs)
         raise SettingError("enough")
 
     monkeypatch.setattr(run, "run", note)
-    assert main(["profile", "cornell", "-o", str(tmp_path), "--size", "8x8", "--peers", "none"]) == 2
+    assert main(["profile", "cornell", "-o", str(tmp_path), "--size", "8x8", "--thorough", "--peers", "none"]) == 2
     assert chosen == [name for name in graph_names() if name != "denoised"]
     assert f"note: left out: {LINE}" in capsys.readouterr().err

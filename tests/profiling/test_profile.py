@@ -327,7 +327,7 @@ def test_the_quick_default_is_small_and_the_thorough_one_is_that_of_a_render(mon
         assert main(["profile", "cornell", "-o", str(tmp_path), *extra]) == 2
     quick, thorough, named, sized = made
     assert (quick.size, quick.seeds, quick.vpls, quick.peers) == ((128, 128), 1, [16, 64], ())
-    assert set(quick.graphs) < set(graph_names()) == set(thorough.graphs)
+    assert set(quick.graphs) < set(thorough.graphs) <= set(graph_names())  # not those whose extra is not installed
     assert (thorough.size, thorough.seeds, thorough.vpls) == ((512, 512), 3, [16, 64, 256])
     assert thorough.most_spp > quick.most_spp
     assert thorough.peers

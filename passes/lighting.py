@@ -7,14 +7,14 @@ block holds are drawn block by block and added in 32-bit floats.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.frame.screen_tiles import FEWEST, Tiles, list_draws
+from deferred_ir.frame.screen_tiles import TILES, count_pairs
 from deferred_ir.frame.vpl_buffer import BINDING, VPL, VPLS_PER_BLOCK
 from deferred_ir.gl.shaders import Program
 from deferred_ir.graph.figures import Figure
@@ -26,7 +26,10 @@ from deferred_ir.shadows.filter import ShadowFilter
 LIGHTS_SKIPPED = Figure(
     "lights_skipped",
     "Pairs of a screen tile and a light that were not shaded.",
-    left_out=("{n} pairs of tile and light", "the tile of the screen lies behind the light, or outside its cone"),
+    left_out=(
+        "{n} pairs of tile and light",
+        "the tile shows nothing in front of the light and inside its cone",
+    ),
 )
 
 
@@ -41,6 +44,7 @@ class Lighting(Pass):
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
         "albedo": Input("reflectance", format="rgba16f"),
+        "tiles": Input("which VPLs may light which tiles of the screen", format="rg32ui", optional=True),
         "spotlight": Input("irradiance from the spotlight over its emission, instead of a map", "r32f", optional=True),
         "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
         "indirect": Input("irradiance from the VPLs, instead of adding them up", format="rgba32f", optional=True),
@@ -64,26 +68,34 @@ class Lighting(Pass):
         return frozenset({"camera", "models"})
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Draw the frame once for each block of VPLs, or tile by tile with the VPLs that may light the tile."""
+        """Draw the frame once for each block of VPLs."""
         lights, vpls = io["lights"], io["vpls"].records
         lights.bind()
         if io["views"]:
             io["views"].bind()
         views = io["views"].records if io["views"] else None
-        defines = shader_variants.choose_for_pixels(frame, vpls)
+        defines = shader_variants.choose_for_pixels(frame, vpls) | self.params.defines()
         defines |= shader_variants.choose_for_lights(frame, lights.records, views)
-        program = io.program("lighting.frag", defines=defines | self.params.defines())
+        culled = io["tiles"] is not None and not frame.keep_all
+        program = io.program("lighting.frag", defines=defines | {"HAS_TILES": int(culled)})
         io.gpu.ctx.blend_func = io.gpu.ctx.ONE, io.gpu.ctx.ONE
         if io["indirect"]:
             vpls = vpls[:0]
-        # On a GPU, reading the depth back would stall, and a draw costs more than the VPLs that it skips.
-        if len(vpls) >= FEWEST and io.gpu.device.kind == "software" and not frame.keep_all:
-            self._draw_tiles(frame, io, program, vpls)
+        if culled:
+            self._draw_culled(io, program, len(vpls))
         else:
-            self._draw_blocks(io, program, vpls)
+            self._draw_shining(io, program, vpls)
 
-    def _draw_blocks(self, io: Io, program: Program, vpls: np.ndarray) -> None:
-        """Draw the whole frame once for each block of VPLs."""
+    def _draw_culled(self, io: Io, program: Program, count: int) -> None:
+        """Draw each block of the `count` VPLs; pixels take those of their tile."""
+        for block in range(max(-(-count // VPLS_PER_BLOCK), 1)):
+            io["vpls"].bind(block)
+            program.set(block=block)
+            self._draw(io, program, first=block == 0, count=min(count - block * VPLS_PER_BLOCK, VPLS_PER_BLOCK))
+        io.count(LIGHTS_SKIPPED.name, TILES**2 * count - count_pairs(io["tiles"].read()))
+
+    def _draw_shining(self, io: Io, program: Program, vpls: np.ndarray) -> None:
+        """Draw the VPLs that have power, block by block."""
         lit = vpls[find_shining(vpls)]
         blocks = max(-(-len(lit) // VPLS_PER_BLOCK), 1)
         packed = np.zeros(blocks * VPLS_PER_BLOCK, VPL)
@@ -91,23 +103,10 @@ class Lighting(Pass):
         buffer = io.gpu.uniforms(packed.tobytes()) if len(lit) < len(vpls) else None
         for start in range(0, max(len(lit), 1), VPLS_PER_BLOCK):
             if buffer:
-                _bind(buffer, start)
+                buffer.bind_to_uniform_block(BINDING, offset=start * VPL.itemsize, size=VPLS_PER_BLOCK * VPL.itemsize)
             else:
                 io["vpls"].bind(start // VPLS_PER_BLOCK)
             self._draw(io, program, first=start == 0, count=min(len(lit) - start, VPLS_PER_BLOCK))
-
-    def _draw_tiles(self, frame: Frame, io: Io, program: Program, vpls: np.ndarray) -> None:
-        """Draw the frame tile by tile, without the VPLs that add nothing to the tile."""
-        tiles = Tiles.build(io["depth"].read()[..., 0], frame.scene.camera, frame.near)
-        packed, draws = list_draws(tiles, vpls)
-        io.gpu.ctx.finish()  # maps that are still being drawn would be timed with what comes after this pass
-        buffer = io.gpu.uniforms(packed.tobytes())
-        io.framebuffer.clear_color()
-        for draw in draws:
-            _bind(buffer, draw.start)
-            io.gpu.scissor(draw.rectangle)
-            self._draw(io, program, first=draw.first, count=draw.count)
-        io.count(LIGHTS_SKIPPED.name, len(tiles.rectangles) * len(vpls) - sum(draw.count for draw in draws))
 
     def _draw(self, io: Io, program: Program, *, first: bool, count: int) -> None:
         """Draw `count` VPLs of the bound block. The first draw of a pixel adds the direct lights; later draws blend."""
@@ -115,11 +114,6 @@ class Lighting(Pass):
             io.gpu.ctx.enable(io.gpu.ctx.BLEND)
         program.set(direct=len(io["lights"].records) if first else 0, count=count)
         program.draw_fullscreen()
-
-
-def _bind(buffer: Any, start: int) -> None:
-    """Bind the VPL records from `start` on as the uniform block of VPLs."""
-    buffer.bind_to_uniform_block(BINDING, offset=start * VPL.itemsize, size=VPLS_PER_BLOCK * VPL.itemsize)
 
 
 PASS = Lighting

@@ -12,6 +12,12 @@ layout(binding = UNIT_BLOCKERS) uniform sampler2DArray blockers;
 #endif
 #endif
 
+#if HAS_TILES
+#include "lib/lights/tiles.glsl"
+layout(binding = UNIT_TILES) uniform usampler2D tiles;
+uniform int block;  // number of the bound block of VPLs
+#endif
+
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 layout(binding = UNIT_ALBEDO) uniform sampler2D albedo;
@@ -50,6 +56,10 @@ float visibility(Vpl vpl, Pixel p) {
 #endif
 }
 
+vec3 irradiance_of(Vpl vpl, Pixel p) {
+    return vpl_irradiance(vpl, p.position, p.normal, p.shading_normal) * visibility(vpl, p);
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     float d = texelFetch(depth, pixel, 0).r;
@@ -74,8 +84,16 @@ void main() {
 #if HAS_NEAR_FIELD
     if (direct > 0) irradiance += texelFetch(near_field, pixel, 0).rgb;
 #endif
-    for (int i = 0; i < count; ++i)
-        irradiance += vpl_irradiance(vpls[i], p.position, p.normal, p.shading_normal) * visibility(vpls[i], p);
+#if HAS_TILES  // only VPLs that may light the tile, in their order
+    ivec2 tile = tile_of(pixel, textureSize(depth, 0));
+    for (int first = 0; first < count; first += LIGHT_GROUP) {
+        uvec2 lit = texelFetch(tiles, tile_texel(tile, block, first), 0).rg;
+        for (; lit.x != 0u; lit.x &= lit.x - 1u) irradiance += irradiance_of(vpls[first + findLSB(lit.x)], p);
+        for (; lit.y != 0u; lit.y &= lit.y - 1u) irradiance += irradiance_of(vpls[first + 32 + findLSB(lit.y)], p);
+    }
+#else
+    for (int i = 0; i < count; ++i) irradiance += irradiance_of(vpls[i], p);
+#endif
 #endif
     radiance = vec4(texelFetch(albedo, pixel, 0).rgb * irradiance * INVERSE_PI, 1.0);
 }

@@ -200,9 +200,10 @@ def test_the_record_has_one_frame_for_each_picture_and_all_its_time(renderer):
         added.image()
     one.finish(measurement)
     assert len(measurement.frame_ms) == len(measurement.laps) == 2
-    assert measurement.counters == 12 * [{"vpls_alive": 8, "maps_drawn": 9, "lights_dropped": 0, "lights_skipped": 0}]
+    assert all(counters.pop("lights_skipped") for counters in measurement.counters)
+    assert measurement.counters == 12 * [{"vpls_alive": 8, "maps_drawn": 9, "lights_dropped": 0}]
     for laps, wall in zip(measurement.laps, measurement.frame_ms, strict=True):
-        assert list(laps) == ["lights", "vpl", "gbuffer", "shadow_maps", "lighting", "accumulate", "tonemap"]
+        assert list(laps) == [*(step.name for step in plan.steps if step.name != "tonemap"), "accumulate", "tonemap"]
         assert 0.7 * wall < sum(cpu for _, cpu in laps.values()) < wall
 
 

@@ -14,7 +14,7 @@ from small_scenes import build, crooked_room, gable, plane, room
 
 from deferred_ir.cli import main
 from deferred_ir.frame.fullscreen import FullscreenPass
-from deferred_ir.frame.screen_tiles import Tiles
+from deferred_ir.frame.screen_tiles import TILES, count_pairs
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.aliasing import alias_textures
 from deferred_ir.graph.ports import Input, Output, Texture
@@ -224,12 +224,21 @@ def test_tiles_of_the_screen_skip_lights_that_they_lie_behind(renderer, graph, s
     assert same_pixels(image, full)
 
 
-def test_tiles_that_show_nothing_are_not_drawn(renderer):
+@pytest.mark.parametrize("size", [(192, 192), (45, 20)])
+def test_tiles_list_no_lights_where_they_show_nothing(renderer, size):
     scene = build(plane(), camera=Camera((0.0, 3.0, 0.1), (2.0, 0.0, 0.0), fov=70.0))
-    (image, _, _), (full, _, _) = both(renderer, scene, "deferred", vpls=16, size=(192, 192))
+    (image, counters, _), (full, _, _) = both(renderer, scene, "deferred", vpls=16, size=size)
     assert same_pixels(image, full)
-    camera = Tiles.build(np.where(np.arange(192) > 100, 0.5, 0.0)[None].repeat(192, axis=0), scene.camera, 0.1)
-    assert sorted(set(camera.rectangles[:, 0].tolist())) == [64, 128]
+    one = renderer(size)
+    one.render(scene, vpls=16)
+    depth, texels = (one.read_texture(source) for source in (("gbuffer", "depth"), ("cull_lights", "tiles")))
+    columns, rows = (np.arange(length) * TILES // length for length in size)
+    shows = np.zeros((TILES, TILES), bool)
+    np.logical_or.at(shows, (rows[:, None], columns), depth[..., 0] > 0)
+    lit = texels[:TILES, :TILES].any(axis=-1)
+    assert lit.any()
+    assert not (lit & ~shows).any()
+    assert counters["lights_skipped"] == TILES**2 * counters["vpls_alive"] - count_pairs(texels)
 
 
 @pytest.mark.parametrize("graph", ["deferred", "interleaved"])

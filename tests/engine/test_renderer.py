@@ -121,7 +121,7 @@ def test_memory_is_given_back_with_the_plan(renderer):
     one.render(room(), vpls=4)
     assert one.memory() == few
     assert many["textures"] - few["textures"] >= 4 * 2**20
-    g = 40 * 24 * (8 + 8 + 4 + 16 + 4)  # normals, albedo, depth, radiance, display
+    g = 40 * 24 * (8 + 8 + 4 + 16 + 4) + 32 * 32 * 8  # normals, albedo, depth, radiance, display; lists of tiles
     atlas = one.executor.resource(("shadow_maps", "atlas"))
     assert few["textures"] == g + atlas.nbytes
 
@@ -200,7 +200,9 @@ def test_every_pass_is_timed_in_every_frame(renderer):
         assert all(gpu >= 0 and cpu > 0 for gpu, cpu in laps.values())
         assert sum(cpu for _, cpu in laps.values()) < wall
         assert sum(gpu for gpu, _ in laps.values()) < wall
-    assert measurement.counters[-1] == {"vpls_alive": 8, "maps_drawn": 9, "lights_dropped": 0, "lights_skipped": 0}
+    counters = measurement.counters[-1]
+    assert 0 < counters.pop("lights_skipped") < 32 * 32 * 8
+    assert counters == {"vpls_alive": 8, "maps_drawn": 9, "lights_dropped": 0}
     assert measurement.median_frame_ms() == pytest.approx(np.median(measurement.frame_ms), abs=1e-4)
 
 

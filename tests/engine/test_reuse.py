@@ -68,9 +68,9 @@ def test_a_still_frame_runs_nothing(renderer, graph):
 @pytest.mark.parametrize(
     ("graph", "scene", "options", "ran"),
     [
-        ("deferred", CAMERA, {}, {"gbuffer", "lighting", "tonemap"}),
-        ("deferred", LIGHT, {}, {"lights", "vpl", "shadow_maps", "lighting", "tonemap"}),
-        ("deferred", ROOM, {"seed": 1}, {"vpl", "shadow_maps", "lighting", "tonemap"}),
+        ("deferred", CAMERA, {}, {"gbuffer", "cull_lights", "lighting", "tonemap"}),
+        ("deferred", LIGHT, {}, {"lights", "vpl", "shadow_maps", "cull_lights", "lighting", "tonemap"}),
+        ("deferred", ROOM, {"seed": 1}, {"vpl", "shadow_maps", "cull_lights", "lighting", "tonemap"}),
         ("deferred", ROOM, {"time": 1.0}, set()),
         ("forward", CAMERA, {}, {"visible_faces", "forward", "tonemap"}),
         ("interleaved", CAMERA, {}, {"gbuffer", "light_shares", "neighbours", "gather", "lighting", "tonemap"}),
@@ -166,9 +166,9 @@ def test_each_change_costs_what_it_must(renderer, monkeypatch):
     work, exposed = Work(one, monkeypatch), {**SETTINGS, "tonemap.exposure": 1.0}
     work.of(ROOM, exposed)  # the curve of this exposure is another program, once
     work.of(CAMERA, exposed)
-    # Uploads: the frame's uniforms always; for lighting the lists of tiles; lights, VPLs and views if they changed, and
-    # what the draws of the maps of VPLs and of views read.
-    for scene, expected in ((CAMERA, (3, 2)), (LIGHT, (4, 9)), (BRIGHTER, (2, 4))):
+    # Uploads: the frame's uniforms always; lights, VPLs and views if they changed, and what the draws of the maps of
+    # VPLs and of views read.
+    for scene, expected in ((CAMERA, (4, 1)), (LIGHT, (5, 8)), (BRIGHTER, (3, 3))):
         work.of(ROOM, exposed)
         assert work.of(ROOM, exposed) == (0, 1, {})
         assert work.of(scene, exposed) == (*expected, {})

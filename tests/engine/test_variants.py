@@ -80,7 +80,7 @@ def test_a_scene_compiles_only_what_no_scene_before_it_needed(renderer):
         one.render(scene, **options)
         return library.compiled - before
 
-    assert compiled(room()) == 5  # G-buffer, maps of direct lights and of VPLs, lighting, tone map
+    assert compiled(room()) == 6  # G-buffer, maps of direct lights and of VPLs, lists of tiles, lighting, tone map
     assert compiled(room(), seed=5, time=1.0) == 0
     assert compiled(smooth_scene()) == 2  # G-buffer, lighting
     assert compiled(partly_textured()) == 1  # G-buffer

@@ -80,7 +80,7 @@ class DirectRays(Pass):
             image = starts[:, 3].copy()
             lit = np.flatnonzero(image)
             places = np.broadcast_to(np.asarray(light.position, np.float32), (len(lit), 3))
-            image[lit[tracer.occluded(starts[lit, :3], places)]] = 0
+            image[lit[tracer.occluded(starts.take(lit, axis=0)[:, :3], places)]] = 0
             io.count(RAYS.name, len(lit))
         io["spotlight"].upload(image.reshape(height, width, 1))
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from deferred_ir.frame.direct_lights import LightVersions, describe_output, find_view_owners, pack_lights
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_culling import AXES, LIGHTS_DROPPED, find_reaching, find_shining
+from deferred_ir.frame.light_culling import AXES, LIGHTS_DROPPED, find_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.vpl_buffer import make_axes
 from deferred_ir.graph.pass_base import Pass
@@ -36,9 +36,10 @@ class Lights(Pass):
         records = pack_lights(frame.scene)
         versions = io.state.update(records, frame.scene)
         if frame.by_view and find_shining(records).any():
-            seen = find_reaching(_list_cones(frame.scene), frame.buffers.clusters, frame.scene.camera, frame.size)
-            owners, numbers = find_view_owners(frame.scene), np.arange(len(records))
-            reaches = np.isin(numbers, owners[seen]) | ~np.isin(numbers, owners)  # without views nothing is known
+            seen, owners = frame.seen_clusters.find_reaching(_list_cones(frame.scene)), find_view_owners(frame.scene)
+            reaches = np.ones(len(records), bool)  # without views nothing is known
+            reaches[owners] = False
+            reaches[owners[seen]] = True
             records["emission"][~reaches] = 0
             io.count(LIGHTS_DROPPED.name, int((~reaches).sum()))
         io["lights"].write(records, versions)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.frame.frame import Frame
-from deferred_ir.frame.light_culling import LIGHTS_DROPPED, find_reaching
+from deferred_ir.frame.light_culling import LIGHTS_DROPPED
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.vpl_buffer import MapVersions, describe_output, pack_vpls
 from deferred_ir.frame.vpl_params import VPLS_ALIVE, CastParams
@@ -65,7 +65,7 @@ class Vpl(Pass):
         vpls = self._cast(frame) if p.count > 0 and frame.scene.emits else NONE
         records = pack_vpls(frame.scene, vpls, p, np.arange(len(vpls)))
         if frame.by_view and len(vpls):
-            reaches = find_reaching(records, frame.buffers.clusters, frame.scene.camera, frame.size)
+            reaches = frame.seen_clusters.find_reaching(records)
             records["emission"][~reaches] = 0
             io.count(LIGHTS_DROPPED.name, int((~reaches).sum()))
         io["vpls"].write(records, io.state.update(records, frame.scene) if frame.reuse else None)

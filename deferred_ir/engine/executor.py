@@ -73,9 +73,11 @@ class Executor:
             for single in single_resources(io[port]):
                 if isinstance(single, GpuTexture):  # a buffer knows what was written into it
                     single.touch()
-        self._runs.remember(step, io, frame)
-        self.counters.update(io.counters)
-        self.counters.update(io.figures)
+        if frame.reuse:
+            self._runs.remember(step, io, frame)
+        for published in (io.counters, io.figures):
+            for name, value in published.items():
+                self.counters[name] += value
 
     def resource(self, source: Source) -> Any:
         """Return what (pass, port) wrote in the last frame; KeyError where another pass has written into it since."""

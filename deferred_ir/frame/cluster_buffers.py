@@ -60,9 +60,9 @@ class ClusterBuffers:
 
         The program reads `position` and `view_index`.
         """
-        cluster, row = np.nonzero(visible.T)
-        light = lights[row]
-        instances = np.bincount(cluster, minlength=len(self.clusters))
+        pairs = np.ascontiguousarray(visible.T)
+        light = lights.astype("i4")[np.flatnonzero(pairs) % max(len(lights), 1)]
+        instances = np.count_nonzero(pairs, axis=1)
         commands = self._each.copy()
         commands["instances"], commands["base_instance"] = instances, np.cumsum(instances) - instances
         commands = commands[instances > 0]
@@ -71,7 +71,7 @@ class ClusterBuffers:
         if 4 * len(light) > self._lights.size:
             self._lights.orphan(4 * len(light))
             self.gpu.gl.check(f"drawing {len(light)} clusters")
-        self._lights.write(light.astype("i4").tobytes())
+        self._lights.write(light.tobytes())
         self._commands.write(commands.tobytes())
         if patches:
             self.gpu.ctx.patch_vertices = 3

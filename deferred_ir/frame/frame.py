@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from deferred_ir.base.arrays import Vec3
+from deferred_ir.frame.light_culling import SeenClusters, find_seen_clusters
 from deferred_ir.frame.scene_buffers import SceneBuffers
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.rays.pixel_surfaces import Surfaces, decode_gbuffer, decode_samples
@@ -71,6 +73,11 @@ class Frame:
     def near(self) -> float:
         """Near plane of the camera and of all lights, in world units."""
         return NEAR * self.scene.geometry.scale
+
+    @cached_property
+    def seen_clusters(self) -> SeenClusters:
+        """The clusters of triangles that the camera may see."""
+        return find_seen_clusters(self.buffers.clusters, self.scene.camera, self.size)
 
     def read_surfaces(self, depth: GpuTexture, normals: GpuTexture) -> Surfaces:
         """Return the surfaces that the pixels of a G-buffer show, read back once, after both textures were written."""

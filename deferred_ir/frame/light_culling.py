@@ -6,6 +6,8 @@ have the terms that they have with all VPLs but for zeros, in the same order, an
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from deferred_ir.base.arrays import Bools, Ints
@@ -44,21 +46,34 @@ def put_shining_first(records: np.ndarray, starts: Ints) -> np.ndarray:
     return records[np.lexsort((~find_shining(records), part))]
 
 
-def find_reaching(records: np.ndarray, clusters: Clusters, camera: Camera, size: tuple[int, int]) -> Bools:
-    """Return which lights may light something that `camera` sees, bool (n,).
+@dataclass(frozen=True, eq=False)
+class SeenClusters:
+    """The clusters `chosen`, int (m,), that lie in the camera's pyramid. margin: by which lights may miss them."""
 
-    records: VPL (n,), or others with the axes of a view that is as wide as the light's cone. size: of the frame,
-    (width, height). The others shine on no cluster that lies in the camera's pyramid.
-    """
+    clusters: Clusters
+    chosen: Ints
+    margin: float
+
+    def find_reaching(self, records: np.ndarray) -> Bools:
+        """Return which lights may light one of them, bool (n,).
+
+        records: VPL (n,), or others with the axes of a view that is as wide as the light's cone.
+        """
+        reaches = np.zeros(len(records), bool)
+        for some in (self.chosen[::STRIDE], self.chosen):
+            left = np.flatnonzero(~reaches)
+            if not len(left):
+                break
+            reaches[left] = self.clusters.find_within(records[left], margin=self.margin, only=some).any(axis=1)
+        return reaches
+
+
+def find_seen_clusters(clusters: Clusters, camera: Camera, size: tuple[int, int]) -> SeenClusters:
+    """Return what `camera` may see in a frame of `size` (width, height)."""
     rays = camera.ray_axes(size)
     view = np.zeros(1, AXES)
     view["position"] = camera.position
     # As a light's: NDC = dot(d, axis) / dot(d, z).
     view["x_axis"], view["y_axis"], view["z_axis"] = rays / (rays**2).sum(axis=1, keepdims=True)
     margin = MARGIN * (clusters.reach + float(np.abs(camera.position).max()))
-    seen = np.flatnonzero(clusters.find_within(view, margin=margin)[0])
-    reaches = np.zeros(len(records), bool)
-    for some in (seen[::STRIDE], seen):
-        left = np.flatnonzero(~reaches)
-        reaches[left] = clusters.find_within(records[left], margin=margin, only=some).any(axis=1)
-    return reaches
+    return SeenClusters(clusters, np.flatnonzero(clusters.find_within(view, margin=margin)[0]), margin)

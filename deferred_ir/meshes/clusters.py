@@ -80,15 +80,18 @@ class Clusters:
         position = lights["position"]
         # An upper bound of the terms that the dot products here and in the shader add up.
         terms = (np.abs(x) + np.abs(y) + np.abs(z)).sum(axis=1) * (self.reach + np.abs(position).max(axis=1))
-        slack = terms * np.float32(ROUNDING)
+        normals = np.stack([z] if hemisphere else [z, z + x, z - x, z + y, z - y])
+        # The corner of the box that is farthest along the normal decides.
+        planes = np.empty((*normals.shape[:2], 7), np.float32)
+        planes[..., :3] = normals
+        np.abs(normals, out=planes[..., 3:6])
+        planes[..., 6] = terms * np.float32(ROUNDING) - np.einsum("pni,ni->pn", normals, position)
+        if margin > 0:
+            planes[..., 6] += np.float32(margin) * np.sqrt(np.einsum("pni,pni->pn", normals, normals))
         boxes = self._boxes[:, only]
         outside = np.zeros((len(lights), boxes.shape[1]), bool)
-        for normal in (z,) if hemisphere else (z, z + x, z - x, z + y, z - y):
-            offset = slack - (normal * position).sum(axis=1)
-            if margin > 0:
-                offset += np.float32(margin) * np.linalg.norm(normal, axis=1)
-            # The corner of the box that is farthest along the normal decides.
-            outside |= np.column_stack([normal, np.abs(normal), offset]) @ boxes < 0
+        for plane in planes:
+            outside |= plane @ boxes < 0
         return ~outside
 
     def find_drawn(self, lights: np.ndarray) -> Bools:

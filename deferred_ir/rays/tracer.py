@@ -55,7 +55,7 @@ class Hits:
 class Tracer:
     """Ray queries on one scene. Build it once a scene, and let it `follow` the scene's moving models.
 
-    `seconds` is the time spent inside Embree so far.
+    `seconds` is the time spent in queries so far, nearly all of it inside Embree.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -84,7 +84,7 @@ class Tracer:
 
     def closest(self, origins: Array, directions: Array) -> Hits:
         """Return the first surfaces that rays (n, 3), (n, 3) hit; the caller offsets origins that lie on a surface."""
-        org, dirs = origins.astype(np.float32), directions.astype(np.float32)
+        org, dirs = (np.ascontiguousarray(vectors, np.float32) for vectors in (origins, directions))
         face, u, v = self._first(lambda chunk: self._rays.closest(org[chunk], dirs[chunk]), len(org))
         u, v = u.astype(np.float64), v.astype(np.float64)
         return self._hits(face, np.stack([1 - u - v, u, v], axis=-1), np.asarray(directions, np.float64))
@@ -94,7 +94,7 @@ class Tracer:
 
         Returns the rows of these rays (m,), ascending, and their m closest hits; rays that miss cost little.
         """
-        org, dirs = origins.astype(np.float32), directions.astype(np.float32)
+        org, dirs = (np.ascontiguousarray(vectors, np.float32) for vectors in (origins, directions))
         ends = np.broadcast_to(np.minimum(reach, INFINITE).astype(np.float32), len(org))
         face, u, v = self._first(lambda chunk: self._rays.closest(org[chunk], dirs[chunk], ends[chunk]), len(org))
         rows = np.flatnonzero(face >= 0)
@@ -132,10 +132,14 @@ class Tracer:
         offset (see `lift`). lifted: targets are offset as well, and the whole way counts, since a wall may stand close
         to them.
         """
-        org, way = origins.astype(np.float32), (targets - origins).astype(np.float32)
-        reach = np.full(len(org), 1 if lifted else 1 - 1e-4, np.float32)
-        parts = self._map(lambda chunk: self._rays.occluded(org[chunk], way[chunk], reach[chunk]), len(org))
-        return np.concatenate([np.zeros(0, bool), *parts])
+        end = np.float32(1 if lifted else 1 - 1e-4)
+
+        def ask(chunk: slice) -> Bools:
+            start = origins[chunk]
+            way = np.ascontiguousarray(targets[chunk] - start, np.float32)
+            return self._rays.occluded(np.ascontiguousarray(start, np.float32), way, np.full(len(way), end))
+
+        return np.concatenate([np.zeros(0, bool), *self._map(ask, len(origins))])
 
     def lift(self, positions: Array, normals: Array) -> Array:
         """Return points pushed off their surfaces along `normals`, so that rays from them do not hit these again."""

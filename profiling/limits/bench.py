@@ -15,6 +15,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median, quantiles
 from typing import Any
@@ -24,8 +25,10 @@ from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.loading.load import load
 from deferred_ir.profiling.figures import markdown
+from deferred_ir.profiling.limits.allocations import measure_allocations
 from deferred_ir.profiling.limits.host_costs import cold_start, python_time
 from deferred_ir.profiling.limits.passes import FOLDER, LIMITS
+from deferred_ir.profiling.limits.ray_rates import PASSES, measure_ray_rates
 from deferred_ir.profiling.measure import name_device, time_frames
 from deferred_ir.profiling.study import command_line
 from deferred_ir.scene.scene import Scene
@@ -52,8 +55,13 @@ COMPARISONS = {
 }
 HOST: Mapping[str, Callable[..., list[float]]] = {
     "cold start / an empty context": cold_start,
-    "Python's own time in a deferred frame, ms": python_time,
+    "Python's own time in a deferred frame, ms": partial(python_time, graph="deferred"),
+    "Python's own time in a resampled frame, ms": partial(python_time, graph="resampled"),
 }
+RATES = {f"rays a second, {name} / Embree alone": name for name in (*PASSES, "all three")}
+"""Rows of the graph `resampled`, and the passes of `measure_ray_rates`."""
+ALLOCATED = "arrays that NumPy allocates in a resampled frame, MiB"
+ROWS = *COMPARISONS, *HOST, *RATES, ALLOCATED
 
 
 def time_graphs(
@@ -101,9 +109,16 @@ def column(name: str, rows: Sequence[str], **options: Any) -> list[str]:
     chosen = [COMPARISONS[row] for row in rows if row in COMPARISONS]
     used = {graph for comparison in chosen for graph, _ in (comparison.over, comparison.under)}
     measured = time_graphs(scene, [graph for graph in GRAPHS if graph in used], **options) if used else {}
+    rates = measure_ray_rates(name, **options) if RATES.keys() & set(rows) else {}
     for row in rows:
+        if row == ALLOCATED:
+            cells.append(list_allocations(name, **options))
+            continue
         if row in HOST:
             values = HOST[row](name, **options)
+        elif row in RATES:
+            values, millions = rates[RATES[row]]
+            print(f"{name}: {row}: {millions:.3f} million rays", file=sys.stderr)
         else:
             sides = COMPARISONS[row].over, COMPARISONS[row].under
             over, under = (times(measured[graph], quantity) for graph, quantity in sides)
@@ -113,15 +128,24 @@ def column(name: str, rows: Sequence[str], **options: Any) -> list[str]:
     return cells
 
 
+def list_allocations(name: str, **options: Any) -> str:
+    """Return the MiB that NumPy allocates in a frame, and of each pass that allocates a twentieth of it or more."""
+    del options["turns"]
+    found = measure_allocations(name, "resampled", **options)
+    total = sum(found.values())
+    parts = [f"{step} {digits(size / 2**20)}" for step, size in found.items() if step and 20 * size >= total]
+    return f"{digits(total / 2**20)}: {', '.join(parts)}"
+
+
 def report(words: Sequence[str] | None = None) -> str:
     """Measure what the command line asks for. Returns the table in Markdown, and a line on how it was measured."""
     parser = command_line(__doc__, vpls=64, size=(512, 512), device="auto")
     parser.add_argument("--turns", type=int, default=11, choices=range(2, 1000), metavar="N")
     parser.add_argument("--only", default="", metavar="WORD", help="rows whose name contains it")
     chosen = parser.parse_args(words)
-    rows = [row for row in (*COMPARISONS, *HOST) if chosen.only in row]
+    rows = [row for row in ROWS if chosen.only in row]
     if not rows:
-        parser.error(f"--only {chosen.only}: in none of: {'; '.join((*COMPARISONS, *HOST))}")
+        parser.error(f"--only {chosen.only}: in none of: {'; '.join(ROWS)}")
     options = {"vpls": chosen.vpls, "size": chosen.size, "turns": chosen.turns, "device": chosen.device}
     columns = [column(name, rows, **options) for name in chosen.scenes]
     head, *body = zip(["", *rows], *columns, strict=True)

@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from typing import Any
 from unittest import mock
@@ -17,13 +18,13 @@ import moderngl
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.gl import raw
 from deferred_ir.loading.load import load
-from deferred_ir.rays.tracer import Tracer
+from deferred_ir.rays.embree import EmbreeScenes
 
 CALLS = {
     moderngl.VertexArray: ("render", "render_indirect"),
     moderngl.Buffer: ("write",),
     moderngl.Context: ("finish", "enable", "disable", "enable_direct", "disable_direct", "__enter__", "__exit__"),
-    Tracer: ("_map",),
+    EmbreeScenes: ("closest", "occluded"),
 }
 """Methods whose time is not Python's: of drivers, which draw in the caller's thread without a GPU, and of Embree."""
 CONTEXT = "import numpy, moderngl; moderngl.create_standalone_context({}).clear()"
@@ -31,42 +32,57 @@ CONTEXT = "import numpy, moderngl; moderngl.create_standalone_context({}).clear(
 
 
 @contextmanager
-def stopwatch() -> Iterator[list[float]]:
-    """Yield a list of one number: the thread's seconds inside calls of OpenGL and Embree that can take long."""
-    spent = [0.0]
+def stopwatch() -> Iterator[Callable[[], float]]:
+    """Yield a clock of Python's own time in seconds: CPU time of this thread and of the tasks that it hands to others.
 
-    def timed(function: Callable[..., Any]) -> Callable[..., Any]:
+    Calls of OpenGL and Embree that can take long do not count. OpenGL's raw functions are found from here on: make the
+    context afterwards.
+    """
+    spent, elsewhere, find = [0.0], list[float](), raw.GL.__getattr__
+
+    def timed(function: Callable[..., Any], times: list[float]) -> Callable[..., Any]:
         def call(*arguments: Any, **options: Any) -> Any:
             start = time.thread_time()
-            result = function(*arguments, **options)
-            spent[0] += time.thread_time() - start
-            return result
+            try:
+                return function(*arguments, **options)
+            finally:
+                times.append(time.thread_time() - start)  # from any thread
 
         return call
 
-    find = raw.GL.__getattr__
+    def find_timed(gl: raw.GL, name: str) -> Callable[..., Any]:
+        function = timed(find(gl, name), elsewhere)
+        setattr(gl, name, function)
+        return function
+
+    submit = ThreadPoolExecutor.submit
+
+    def submit_timed(pool: ThreadPoolExecutor, function: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+        return submit(pool, timed(function, spent), *arguments, **options)
+
     with ExitStack() as patches:
         for kind, names in CALLS.items():
             for name in names:
-                patches.enter_context(mock.patch.object(kind, name, timed(getattr(kind, name))))
-        patches.enter_context(mock.patch.object(raw.GL, "__getattr__", lambda gl, name: timed(find(gl, name))))
-        yield spent
+                patches.enter_context(mock.patch.object(kind, name, timed(getattr(kind, name), elsewhere)))
+        patches.enter_context(mock.patch.object(raw.GL, "__getattr__", find_timed))
+        patches.enter_context(mock.patch.object(ThreadPoolExecutor, "submit", submit_timed))
+        yield lambda: time.thread_time() + sum(spent) - sum(elsewhere)
 
 
-def python_time(scene: str, *, vpls: int, size: tuple[int, int], turns: int, device: str) -> list[float]:
-    """Return Python's own time in each of `turns` deferred frames, milliseconds.
+def python_time(scene: str, *, graph: str, vpls: int, size: tuple[int, int], turns: int, device: str) -> list[float]:
+    """Return Python's own time in each of `turns` frames of `graph`, milliseconds, all threads together.
 
-    It is the thread's CPU time without that inside OpenGL and Embree. Only OpenGL calls that can take long are
-    subtracted, so it is an upper bound. Waiting does not count, since a busy machine adds it anywhere.
+    It is CPU time without that inside OpenGL and Embree. Only calls that can take long are subtracted, so it is an
+    upper bound. Waiting does not count, since a busy machine adds it anywhere.
     """
     loaded, times = load(scene), []
-    with stopwatch() as spent, Renderer(size, "deferred", device) as renderer:
+    with stopwatch() as own, Renderer(size, graph, device) as renderer:
         plan = renderer.plan(loaded, vpls, ["radiance"])
         renderer.draw(loaded, plan)
         for _ in range(turns):  # with one seed, as in an animation, whose pattern is made once
-            start, others = time.thread_time(), spent[0]
+            start = own()
             renderer.draw(loaded, plan)
-            times.append((time.thread_time() - start - (spent[0] - others)) * 1e3)
+            times.append((own() - start) * 1e3)
     return times
 
 

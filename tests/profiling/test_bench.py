@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import re
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from deferred_ir.engine.measurement import Measurement
+from deferred_ir.engine.renderer import Renderer
 from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 from deferred_ir.loading.load import load
 from deferred_ir.profiling.figures import markdown
 from deferred_ir.profiling.limits import bench
-from deferred_ir.profiling.limits.host_costs import cold_start, python_time, seconds
+from deferred_ir.profiling.limits.allocations import count_allocations, measure_allocations
+from deferred_ir.profiling.limits.host_costs import cold_start, python_time, seconds, stopwatch
 from deferred_ir.profiling.limits.passes import LIMITS
+from deferred_ir.profiling.limits.ray_rates import PASSES, join, measure_ray_rates, recorder
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
@@ -103,7 +108,51 @@ def test_only_picks_rows_and_refuses_a_word_in_none(capsys):
 
 
 def test_pythons_own_time_is_part_of_a_frame():
-    assert all(0 < time < 1000 for time in python_time("cornell", **OPTIONS))
+    for graph in ("deferred", "resampled"):
+        assert all(0 < time < 1000 for time in python_time("cornell", graph=graph, **OPTIONS))
+
+
+def test_tasks_on_other_threads_count_as_pythons_own_time():
+    def work(seconds):
+        start = time.thread_time()
+        while time.thread_time() < start + seconds:
+            pass
+
+    with stopwatch() as own, ThreadPoolExecutor(2) as pool:
+        start = own()
+        list(pool.map(work, [0.05, 0.05]))
+        assert 0.1 <= own() - start < 0.2
+
+
+def test_embree_alone_traces_the_rays_of_each_pass():
+    with recorder() as calls, Renderer((64, 64), "resampled", "software") as one:
+        one.draw(load("cornell"), one.plan(load("cornell"), 4, ["radiance"]))
+        traced = one.executor.counters["direct_rays"], one.executor.counters["choice_rays"]
+    rays = join(calls)
+    assert set(rays) == set(PASSES)
+    assert [len(part.arguments[0]) for name in PASSES[:2] for part in rays[name]] == [*traced]
+    assert {part.query for part in rays["near_field"]} == {"closest", "occluded"}
+    rates = measure_ray_rates("cornell", **OPTIONS)
+    assert set(rates) == {*PASSES, "all three"}
+    assert all(0 < ratio < 10 for ratios, _ in rates.values() for ratio in ratios)
+
+
+def test_every_array_that_numpy_allocates_is_counted():
+    with count_allocations() as count:
+        both = np.ones(1000) + np.zeros(1000)
+        both += 1
+        both[:500].sum()
+        assert 3 * 8000 <= count[0] < 3 * 8000 + 200  # and a few scalars
+    total = count[0]
+    assert len(np.concatenate([both, both])) == 2000
+    assert count == [total]
+
+
+def test_what_a_frame_allocates_is_the_same_each_time():
+    options = {name: OPTIONS[name] for name in ("vpls", "size", "device")}
+    one, other = (measure_allocations("cornell", "resampled", **options) for _ in range(2))
+    assert one == other
+    assert one["trace_choices"] > 0
 
 
 def test_a_cold_start_takes_longer_than_an_empty_context():
@@ -118,4 +167,4 @@ def test_a_process_that_fails_ends_the_measurement_with_its_words():
 def test_the_page_has_the_rows_that_are_measured():
     page = tool.PAGE.read_text(encoding="utf-8")
     rows = re.findall(r"^\| ([^|]+) \|", page.partition(tool.BEGIN)[2].partition(tool.END)[0], re.MULTILINE)
-    assert rows == ["---", *bench.COMPARISONS, *bench.HOST]
+    assert rows == ["---", *bench.ROWS]

@@ -10,7 +10,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.base.files import write_whole
-from deferred_ir.truth.metrics import EPSILON
+from deferred_ir.base.relative_error import weigh
 
 ERRORS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 COLOURS = ((33, 64, 154), (120, 164, 217), (247, 247, 247), (239, 138, 98), (165, 15, 38))
@@ -23,7 +23,7 @@ NARROWEST = 240
 def measure_signed_errors(image: Array, reference: Array, reference_mean: float) -> Array:
     """Return the relative errors of luminance, (Y_I - Y_R) / sqrt(Y_R^2 + 0.01 mean(R)^2), (H, W)."""
     ours, truth = image @ LUMINANCE, reference @ LUMINANCE
-    errors: Array = (ours - truth) / np.sqrt(truth**2 + EPSILON * reference_mean**2)
+    errors: Array = (ours - truth) / np.sqrt(weigh(truth, reference_mean))
     return errors
 
 

@@ -22,14 +22,11 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools
 from deferred_ir.base.errors import SettingError
+from deferred_ir.base.relative_error import count_kept, trimmed_mean, weigh
 from deferred_ir.output.image import check_radiance
 from deferred_ir.truth import flip
 from deferred_ir.truth.flip import FlipParameters
 
-EPSILON = 0.01
-"""relMSE adds this times mean(R)^2 to R^2, so that dark pixels do not decide alone."""
-TRIMMED = 0.001
-"""Fraction of the pixels, the worst ones, that trimmed relMSE leaves out."""
 DARKEST = float(np.finfo(np.float32).tiny)
 """Mean radiance of a reference below which it counts as black."""
 NAMES = ("image", "reference")
@@ -79,21 +76,14 @@ class _Pair:
         """The mean radiance of the reference."""
         return float(self.reference[self.mask].sum() / (3 * self.count))
 
-    @property
-    def best(self) -> int:
-        """How many pixels, the best ones, trimmed relMSE is over."""
-        return max(1, int(self.count * (1 - TRIMMED)))
-
     def errors(self) -> Array:
         """Return squared relative errors, averaged over RGB, (H, W); 0 outside the mask."""
-        with_epsilon = self.reference**2 + EPSILON * self.mean**2
-        errors: Array = ((self.image - self.reference) ** 2 / with_epsilon).mean(-1)
+        errors: Array = ((self.image - self.reference) ** 2 / weigh(self.reference, self.mean)).mean(-1)
         return np.where(self.mask, errors, 0.0)
 
     def relmse(self) -> tuple[float, float]:
-        errors = np.sort(self.errors(), axis=None)
-        trimmed = errors[: errors.size - (self.count - self.best)]
-        return float(trimmed.sum() / self.best), float(errors.sum() / self.count)
+        errors = self.errors()
+        return trimmed_mean(errors, self.count), float(errors.sum() / self.count)
 
     def rmse(self) -> float:
         squares = (self.image - self.reference)[self.mask] ** 2
@@ -134,7 +124,7 @@ def compare(
         size=(width, height),
         pixels=pair.count,
         pixels_by=pair.counted_by,
-        trimmed_pixels=pair.count - pair.best,
+        trimmed_pixels=pair.count - count_kept(pair.count),
         image_mean=float(pair.image[pair.mask].sum() / (3 * pair.count)),
         reference_mean=pair.mean,
     )

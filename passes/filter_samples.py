@@ -70,6 +70,11 @@ class FilterSamples(Pass):
         """Leave the pass out where there are no VPLs."""
         return explain_no_vpls(facts)
 
+    def explain_shared_error(self, facts: Facts) -> str | None:
+        """Say that light is filtered."""
+        del facts
+        return "the filter blurs light inside surfaces" if self.params.steps else None
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Draw step by step."""
         steps, unit = self.params.steps, int(io.defines["UNIT_IRRADIANCE"])

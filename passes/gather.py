@@ -17,6 +17,7 @@ from deferred_ir.base.arrays import Ints
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import count_shining
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.shadows import shader_variants
@@ -50,6 +51,11 @@ class Gather(Pass):
     def depends(self) -> frozenset[str]:
         """The camera, to reconstruct lonely pixels' positions from the depth; and the seed, which shifts the window."""
         return frozenset({"camera", "seed"})
+
+    def explain_shared_error(self, facts: Facts) -> str | None:
+        """Say that light is filtered."""
+        del facts
+        return "the filter blurs the light of single VPLs"
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Filter, then light the lonely pixels."""

@@ -65,6 +65,11 @@ class IncrementalVpl(Pass):
         stated: Statements = self.params.state_facts(facts)
         return stated
 
+    def explain_shared_error(self, facts: Facts) -> str | None:
+        """Return how VPLs lose light."""
+        lost: str | None = self.params.explain_lost_light(facts)
+        return lost
+
     def frames_to_fill(self) -> int:
         """As many VPLs as there may be new ones in each."""
         count, most = int(self.params.count), int(self.params.most)

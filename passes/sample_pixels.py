@@ -72,6 +72,11 @@ class SamplePixels(Pass):
         """Leave the pass out where there are no VPLs."""
         return explain_no_vpls(facts)
 
+    def explain_shared_error(self, facts: Facts) -> str | None:
+        """Return how far samples are apart."""
+        del facts
+        return f"light is blended from samples {self.params.scale} pixels apart" if self.params.scale > 1 else None
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Find lonely pixels, then gather the samples' surfaces."""
         layout = Layout.of_frame(frame.size, self.params.scale, frame.seed)

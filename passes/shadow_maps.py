@@ -67,6 +67,11 @@ class ShadowMaps(Pass):
         """Return a reason if the spotlight is dark: then there are no VPLs either."""
         return None if facts[EMITS] else "no light needs one: the spotlight emits nothing"
 
+    def explain_shared_error(self, facts: Facts) -> str | None:
+        """Return what maps cannot resolve."""
+        del facts
+        return "shadows are as fine as the maps' texels"
+
     def depends(self) -> frozenset[str]:
         """The lights and the models; VPLs come as an input."""
         return frozenset({"light", "models"})

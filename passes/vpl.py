@@ -55,6 +55,11 @@ class Vpl(Pass):
         stated: Statements = self.params.state_facts(facts)
         return stated
 
+    def explain_shared_error(self, facts: Facts) -> str | None:
+        """Return how VPLs lose light."""
+        lost: str | None = self.params.explain_lost_light(facts)
+        return lost
+
     def depends(self) -> frozenset[str]:
         """Where the light falls, and for a choice among candidates what the camera sees."""
         return frozenset({"light", "models", "seed"} | ({"camera"} if self.params.candidates > 1 else set()))

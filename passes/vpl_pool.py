@@ -71,6 +71,11 @@ class VplPool(Pass):
         stated: Statements = self.params.state_facts(facts)
         return stated
 
+    def explain_shared_error(self, facts: Facts) -> str | None:
+        """Return how VPLs lose light."""
+        lost: str | None = self.params.explain_lost_light(facts)
+        return lost
+
     def depends(self) -> frozenset[str]:
         """Where the light falls."""
         return frozenset({"light", "models", "seed"})

@@ -9,7 +9,7 @@ from pathlib import Path
 from deferred_ir.base.errors import OutputError
 from deferred_ir.base.files import check_folder
 from deferred_ir.cli.drawing import Picture
-from deferred_ir.engine.renderer import IMAGES
+from deferred_ir.engine.setup import IMAGES, UNFILTERED
 from deferred_ir.output.find_format import check_path, find_format
 from deferred_ir.output.image import Image
 
@@ -37,10 +37,10 @@ class ImageFiles:
             if places.count(place) > 1:
                 raise OutputError(f"{file}: is named twice; give each output a file of its own")
 
-    def choose_outputs(self, known: Mapping[str, str], *, averaged: bool) -> list[str]:
+    def choose_outputs(self, known: Mapping[str, str], *, averaged: bool, estimated: bool = False) -> list[str]:
         """Return the outputs of the graph, `known`, that the files need; all images if there are no files.
 
-        Frames are `averaged` in radiance, whatever the files show.
+        Frames are `averaged` in radiance, whatever the files show; with their error `estimated`, in `unfiltered`, too.
         """
         names = {find_format(Path(name)).LAYER for name in self.names}
         missing = names - known.keys()
@@ -49,7 +49,10 @@ class ImageFiles:
             raise OutputError(f"graph: has no output {which}; add it to [outputs]")
         if averaged and names:
             names.add("radiance")
-        return [name for name in known if name in (names or IMAGES)]
+        names = names or set(IMAGES)
+        if estimated:
+            names.add(UNFILTERED)
+        return [name for name in known if name in names]
 
     def list_notes(self) -> Iterator[str]:
         """Yield which frames get lost."""

@@ -92,6 +92,17 @@ def parse_duration(text: str) -> float:
     return duration
 
 
+def parse_relmse(text: str) -> float:
+    """Read an error, a number above 0."""
+    try:
+        error = float(text)
+    except ValueError:
+        error = math.nan
+    if not 0 < error < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is no relMSE above 0, such as 0.01")
+    return error
+
+
 def split_list(text: str) -> list[str]:
     """Split "a, b,a" at the commas: each word once, in order, without white space and empty words."""
     return list(dict.fromkeys(word for part in text.split(",") if (word := part.strip())))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Container, Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Container, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from numbers import Integral
 from pathlib import Path
 from types import TracebackType
@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from deferred_ir.base.errors import GraphError, SettingError
-from deferred_ir.engine.accumulation import Accumulation
+from deferred_ir.base.errors import SettingError
+from deferred_ir.engine.accumulation import Accumulation, count_most
 from deferred_ir.engine.executor import Executor
 from deferred_ir.engine.measurement import Measurement
-from deferred_ir.engine.setup import Setup
+from deferred_ir.engine.settings import DEFAULT_GRAPH, FOR_ERROR
+from deferred_ir.engine.setup import IMAGES, UNFILTERED, Setup, check_images
 from deferred_ir.frame.facts import collect_facts
 from deferred_ir.frame.frame import PARTS, Frame
 from deferred_ir.frame.scene_buffers import SceneBuffers
@@ -31,14 +32,12 @@ from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
 
-IMAGES = {"radiance": ("rgba32f", "rgba16f"), "display": ("rgba8",)}
-"""Formats of the outputs that become images."""
-
 
 class Renderer:
     """Renders scenes through a render graph.
 
-    size: (width, height) in pixels. graph: a built-in name or a graph file. device: see `deferred-ir devices`.
+    size: (width, height) in pixels. graph: a built-in name or a graph file; None: `deferred`, or for a given error
+    `engine.settings.FOR_ERROR`. device: see `deferred-ir devices`.
     set: parameters of passes, {"pass.param": value}. passes: pass classes of your own, {type name: class}, which a
     graph file then names. reuse: a pass is skipped while its inputs are unchanged; else every
     frame redoes everything. keep_all: leave nothing out that this scene or view does not need; the pixels are the same.
@@ -51,7 +50,7 @@ class Renderer:
     def __init__(
         self,
         size: tuple[int, int] = (512, 512),
-        graph: str | Path = "deferred",
+        graph: str | Path | None = None,
         device: str = "auto",
         *,
         set: Mapping[str, Any] | None = None,
@@ -63,7 +62,9 @@ class Renderer:
         if not isinstance(size, Sequence) or len(size) != 2 or not all(isinstance(n, Integral) and n > 0 for n in size):
             raise SettingError(f"size {size!r}: wants two whole numbers above 0, width and height")
         self.reuse, self._keep_all = reuse, keep_all
-        self.setup = Setup((int(size[0]), int(size[1])), graph, dict(set or {}), dict(passes or {}))
+        self._graph_named = graph is not None
+        name = DEFAULT_GRAPH if graph is None else graph
+        self.setup = Setup((int(size[0]), int(size[1])), name, dict(set or {}), dict(passes or {}))
         self.graph()  # a fault in the graph shows before a context is made
         self.gpu = Gpu(device, window)
         if max(size) > self.gpu.max_size:
@@ -121,28 +122,49 @@ class Renderer:
         key = (vpls, facts, keep_all, wanted)
         if key not in self.setup.plans:
             plan = compile(graph, wanted, facts, keep_all=keep_all, parts=PARTS)
-            _check_images(graph, plan)
+            check_images(graph, plan)
             self.setup.plans[key] = plan
         return self.setup.plans[key]
 
     def render(
-        self, scene: Scene, *, vpls: int | None = None, seed: int = 0, time: float = 0.0, accumulate: int = 1
+        self,
+        scene: Scene,
+        *,
+        vpls: int | None = None,
+        seed: int = 0,
+        time: float = 0.0,
+        accumulate: int | None = None,
+        error: float | None = None,
     ) -> Image:
         """Render one image of `scene` at `time` seconds with `vpls` VPLs (None: as many as the graph says).
 
-        accumulate: frames with fresh samples that are averaged in it; `Accumulation` adds them up one by one.
+        accumulate: frames with fresh samples that are averaged in it; `Accumulation` adds them up one by one. error:
+        add frames until their estimate of the image's relMSE is at most this; `accumulate` is then the most frames
+        (None: 1024), and `error_estimate` of the image says how far it came.
         """
-        if not isinstance(accumulate, Integral) or accumulate < 1:
-            raise SettingError(f"accumulate {accumulate!r}: wants a whole number of 1 or more")
-        images = [name for name in self.graph(vpls).outputs if name in IMAGES]
-        plan = self.plan(scene, vpls, images)
-        if accumulate == 1:
-            self.draw(scene, plan, seed=seed, time=time)
-            return self.read(plan)
-        mean = Accumulation(self, scene, plan, seed=seed, time=time)
-        for _ in range(accumulate):
-            mean.draw()
-        return mean.image()
+        most = count_most(accumulate, error)
+        with self._setup_for(error):
+            wanted = IMAGES if error is None else (*IMAGES, UNFILTERED)
+            plan = self.plan(scene, vpls, [name for name in self.graph(vpls).outputs if name in wanted])
+            if most == 1:
+                self.draw(scene, plan, seed=seed, time=time)
+                return self.read(plan)
+            mean = Accumulation(self, scene, plan, seed=seed, time=time, blend=error is not None)
+            for _ in mean.draw_until(error, most):
+                pass
+            return mean.image()
+
+    @contextmanager
+    def _setup_for(self, error: float | None) -> Iterator[None]:
+        """Draw with the graph that is made for a given error, where none was named."""
+        before = self.setup
+        if error is not None and not self._graph_named:
+            graph, set = FOR_ERROR
+            self.configure(graph=graph, set={**set, **before.set})
+        try:
+            yield
+        finally:
+            self.setup = before
 
     def draw(
         self,
@@ -269,14 +291,3 @@ class Renderer:
 def _same_surfaces(one: Scene, other: Scene) -> bool:
     same_rest = one.geometry.rest is other.geometry.rest
     return same_rest and one.materials is other.materials and one.textures is other.textures
-
-
-def _check_images(graph: Graph, plan: Plan) -> None:
-    """Raise GraphError if an output that becomes an image is of another kind."""
-    steps = {step.name: step for step in plan.steps}
-    for name, (source, port) in plan.outputs.items():
-        found = steps[source].outputs[port].description.format
-        if name in IMAGES and found not in IMAGES[name]:
-            raise GraphError(
-                f"{graph.origin}: outputs.{name}: wants {' or '.join(IMAGES[name])}, but {source}.{port} is {found}"
-            )

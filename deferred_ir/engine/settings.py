@@ -18,11 +18,20 @@ VPLS = "vpls"
 """Role of the parameters that are the number of VPLs."""
 DEFAULT_GRAPH = "deferred"
 DEFAULT_SIZE = (512, 512)
+NO_SETTINGS: Mapping[str, Any] = {}
+FOR_ERROR: tuple[str, Mapping[str, Any]] = "resampled", {"sample_pixels.scale": 1}
+"""Graph and parameters for a given error unless others are named: its frames share no error that they cannot tell."""
 
 
 def choose_graph(name: str | None, defaults: RenderDefaults) -> str:
     """Return --graph, else the scene file's graph, else `deferred`."""
     return name if name is not None else defaults.graph or DEFAULT_GRAPH
+
+
+def choose_for_error(name: str | None, defaults: RenderDefaults) -> tuple[str, Mapping[str, Any]]:
+    """Return the graph for an image of a given error, and parameters that --set may change: FOR_ERROR unless named."""
+    named = name if name is not None else defaults.graph
+    return FOR_ERROR if named is None else (named, NO_SETTINGS)
 
 
 def choose_seed(seed: int | None, defaults: RenderDefaults) -> int:

@@ -13,6 +13,12 @@ from deferred_ir.graph.file import load_graph
 from deferred_ir.graph.graph import Graph, Plan
 from deferred_ir.graph.pass_base import Pass
 
+RADIANCE = "rgba32f", "rgba16f"
+UNFILTERED = "unfiltered"
+"""Name of the output that is radiance before any filter; where the error is estimated, it is averaged, too."""
+IMAGES = {"radiance": RADIANCE, "display": ("rgba8",)}
+"""Formats of the outputs that become images."""
+
 
 @dataclass(frozen=True, eq=False)
 class Setup:
@@ -53,3 +59,15 @@ class Setup:
         )
         setup.graph()
         return setup
+
+
+def check_images(graph: Graph, plan: Plan) -> None:
+    """Raise GraphError if an output that becomes an image, or is averaged beside one, is of another kind."""
+    steps = {step.name: step for step in plan.steps}
+    formats = {**IMAGES, UNFILTERED: RADIANCE}
+    for name, (source, port) in plan.outputs.items():
+        found, wanted = steps[source].outputs[port].description.format, formats.get(name)
+        if wanted and found not in wanted:
+            raise GraphError(
+                f"{graph.origin}: outputs.{name}: wants {' or '.join(wanted)}, but {source}.{port} is {found}"
+            )

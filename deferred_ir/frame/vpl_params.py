@@ -28,6 +28,8 @@ def explain_no_vpls(facts: Facts) -> str | None:
     return None if facts[VPLS] else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
 
 
+FULL_CONE = 179.0
+"""Opening angle from which a cone loses no light to speak of, degrees."""
 AUTO_CLAMP = 0.64
 """Clamp distance of one VPL in diagonals where short rays give back what it takes: best at 64 to 1024 VPLs of both a
 room and a cathedral, and flat about there (half or twice of it costs a tenth to a half of the error)."""
@@ -62,6 +64,16 @@ class VplParams:
         vpls = self.count > 0 and facts[EMITS]
         clamp = self.clamp_fraction
         return {VPLS: vpls, CLAMPED: vpls and clamp > 0, CLAMP: clamp, CONE: self.fov}
+
+    def explain_lost_light(self, facts: Facts) -> str | None:
+        """Return how VPLs lose light in all frames alike, None if they do not."""
+        if not facts[VPLS]:
+            return None
+        lost = [
+            f"VPLs shine into cones of {self.fov:g} degrees" if self.fov < FULL_CONE else "",
+            "their light is clamped" if facts[CLAMPED] and not facts[CLAMP_RETURNED] else "",
+        ]
+        return ", ".join(filter(None, lost)) or None
 
 
 @dataclass(frozen=True)

@@ -86,6 +86,14 @@ class Pass:
         del name, figures, averaged
         return None
 
+    def explain_shared_error(self, facts: Facts) -> str | None:
+        """Return what the pass gets wrong in all frames alike, so that no mean of frames mends it; None for nothing.
+
+        facts: what is known where the pass runs.
+        """
+        del facts
+        return None
+
     def subpasses(self, inputs: Mapping[str, Description | None], state: Any = None) -> Sequence[Mapping[str, Any]]:
         """Return the sub-passes that the pass plans for itself, one dictionary each, for those who read the plan.
 

@@ -21,11 +21,14 @@ LARGEST = float(np.finfo(np.float32).max)
 class Image:
     """radiance: float32 (H, W, 3), linear RGB, top row first, or None where it was not asked for.
 
-    display: uint8 (H, W, 3), sRGB, tone-mapped by the graph, or None likewise.
+    display: uint8 (H, W, 3), sRGB, tone-mapped by the graph, or None likewise. frames: how many it is the mean of.
+    error_estimate: the relMSE to be expected of it, None for a single frame.
     """
 
     radiance: Any
     display: Any
+    frames: int = 1
+    error_estimate: float | None = None
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write `.png` (display pixels), `.npy` or `.exr` (float32 radiance); the file appears whole or not at all."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from deferred_ir.engine.error_estimate import Estimate
 from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.settings import VPLS
 from deferred_ir.graph.figures import Figure
@@ -13,6 +14,7 @@ from deferred_ir.graph.file import graph_hash, list_figures
 from deferred_ir.graph.graph import Graph, Plan
 from deferred_ir.graph.roles import find_parameters
 from deferred_ir.report.left_out import LeftOut, list_for_frames, list_for_scene
+from deferred_ir.report.shared_errors import list_shared_errors
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.scene.scene import Scene
 
@@ -47,6 +49,7 @@ def describe_run(
         "chosen": dict(scene.chosen),
         "graph": graph_name,
         "graph_hash": graph_hash(graph),
+        "set": dict(renderer.setup.set),
         "size": list(renderer.size),
         "vpls": max(find_parameters(graph, VPLS).values(), default=0),
         "seed": seed,
@@ -54,12 +57,28 @@ def describe_run(
         "frames": len(measurement.frame_ms),
         "time": (len(measurement.frame_ms) - 1) / FRAMES_PER_SECOND if scene.moves else 0.0,
         "accumulated": accumulated,
+        "error": None,
         "frame_ms": measurement.median_frame_ms(),
         "passes": passes,
         **_read_figures(list_figures(graph), measurement.counters),
         "left_out": [asdict(entry) for entry in left_out],
         "bias": None,
         "memory_bytes": renderer.memory(),
+    }
+
+
+def describe_error(estimate: Estimate, plan: Plan, *, target: float | None) -> dict[str, Any]:
+    """Return what RUN.json holds of the error of an averaged image: what was asked for, and what its frames tell.
+
+    shared: what they cannot tell, since all get it wrong alike; clamp and cones are measured under `bias`.
+    """
+    return {
+        "target": target,
+        "estimate": estimate.error,
+        "noise": estimate.noise,
+        "filter": estimate.filter,
+        "filtered_share": estimate.share,
+        "shared": list_shared_errors(plan),
     }
 
 

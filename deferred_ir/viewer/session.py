@@ -15,8 +15,9 @@ from typing import Any
 from deferred_ir.base.errors import Error, GraphError
 from deferred_ir.engine.accumulation import Accumulation, find_readers
 from deferred_ir.engine.measurement import Measurement
-from deferred_ir.engine.renderer import IMAGES, Renderer
+from deferred_ir.engine.renderer import Renderer
 from deferred_ir.engine.settings import DEFAULT_GRAPH, choose_settings
+from deferred_ir.engine.setup import IMAGES
 from deferred_ir.gl.devices import Loader
 from deferred_ir.graph.graph import Plan
 from deferred_ir.graph.roles import find_parameters
@@ -27,7 +28,6 @@ from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.scene.scene import Scene
 from deferred_ir.viewer.navigation import as_camera
-from deferred_ir.viewer.noise import Noise
 from deferred_ir.viewer.plan_changes import find_changed
 from deferred_ir.viewer.recording import Recorder
 
@@ -63,7 +63,6 @@ class Session:
         self.laps: dict[str, tuple[float, float]] = {}
         self.skipped: frozenset[str] = frozenset()
         self.counters: dict[str, int] = {}
-        self._noise = Noise()
         self._recorder: Recorder | None = None
         self._undo: Callable[[], None] = lambda: None
         self._still = False
@@ -265,18 +264,20 @@ class Session:
         """Add a frame to the mean where frames are averaged. Returns whether they are."""
         if not self.progressive:
             return False
-        if self.accumulation is None:
-            self.accumulation = Accumulation(self.renderer, self.shown, self.plan, seed=self.seed)
-        self.accumulation.draw()
-        self._noise.add(self.accumulation)
-        self.accumulation.show()
+        mean = self.accumulation or Accumulation(self.renderer, self.shown, self.plan, seed=self.seed)
+        mean.draw()
+        if not mean.frames & (mean.frames - 1):  # at powers of two: it takes a while
+            mean.estimate()
+        self.accumulation = mean
+        mean.show()
         return True
 
     @property
     def noise_text(self) -> str:
         """An estimate of the mean's error, for the status line; "" without one."""
-        noise = self._noise.estimate(self.accumulation) if self.accumulation else None
-        return "" if noise is None else f", relMSE by noise about {noise:.2g}"
+        mean = self.accumulation
+        told = mean.latest if mean else None
+        return f", relMSE by noise about {told.noise * told.frames / mean.frames:.2g}" if mean and told else ""
 
     def output(self, source: tuple[str, str]) -> Any:
         """Return the resource that (pass, port) wrote last, None where the pass has not run yet."""

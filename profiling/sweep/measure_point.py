@@ -7,7 +7,8 @@ from functools import cached_property
 from pathlib import Path
 
 from deferred_ir.engine.measurement import Measurement
-from deferred_ir.engine.renderer import IMAGES, Renderer
+from deferred_ir.engine.renderer import Renderer
+from deferred_ir.engine.setup import IMAGES
 from deferred_ir.output.image import Image
 from deferred_ir.profiling.sweep import points
 from deferred_ir.profiling.sweep.edge_mask import Mask

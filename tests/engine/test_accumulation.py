@@ -180,7 +180,7 @@ def test_a_graph_without_radiance_is_refused(tmp_path, renderer):
         renderer(SIZE, tmp_path / "bare.toml").render(room(), vpls=4, accumulate=2)
 
 
-@pytest.mark.parametrize("count", [0, -1, 1.5, "2", None])
+@pytest.mark.parametrize("count", [0, -1, 1.5, "2"])
 def test_a_number_of_frames_that_is_none_is_one_line(renderer, count):
     with pytest.raises(SettingError, match=r"^accumulate .*: wants a whole number of 1 or more$"):
         renderer(SIZE).render(room(), accumulate=count)

@@ -17,12 +17,13 @@ from deferred_ir.cli.options import (
     add_size,
     add_vpls,
     parse_positive,
+    parse_relmse,
     print_notes,
 )
 from deferred_ir.output.find_format import list_suffixes
 
 if TYPE_CHECKING:
-    from deferred_ir.cli.drawing import Drawing
+    from deferred_ir.cli.drawing import Drawing, Picture
     from deferred_ir.cli.image_files import ImageFiles
     from deferred_ir.engine.renderer import Renderer
     from deferred_ir.scene.scene import Scene
@@ -43,7 +44,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_device(parser)
     parser.add_argument("--frames", type=parse_positive, default=1, metavar="N", help="frame i shows time i/30 s")
     accumulate = "average K frames of fresh samples in each image; Ctrl-C keeps what is done"
-    parser.add_argument("--accumulate", type=parse_positive, default=1, metavar="K", help=accumulate)
+    parser.add_argument("--accumulate", type=parse_positive, metavar="K", help=accumulate)
+    error = "average frames until their estimate of the image's relMSE is at most E; at most K frames (default: 1024)"
+    parser.add_argument("--error", type=parse_relmse, metavar="E", help=error)
     parser.add_argument("--reuse", action="store_true", help="skip a pass while its inputs are unchanged")
     keep_all = "disable scene-specific optimisations; the pixels are the same, for testing"
     parser.add_argument("--keep-all", action="store_true", help=keep_all)
@@ -52,7 +55,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Draw all frames and write what is asked for; after Ctrl-C, what is done by then."""
+    """Draw all frames and write what is asked for; after Ctrl-C, what is done by then.
+
+    Returns 1 where the last image has a larger error than was asked for.
+    """
     from deferred_ir.base.files import write_json
     from deferred_ir.cli.image_files import ImageFiles
     from deferred_ir.engine.settings import list_notes, parse_settings
@@ -76,31 +82,33 @@ def run(arguments: argparse.Namespace) -> int:
                 raise
             print(f"deferred-ir: interrupted: wrote {files.saved} of {arguments.frames} frames", file=sys.stderr)
             return 130
-        print_notes(_explain_unfilled(drawing))
+        print_notes([*_explain_unfilled(drawing), *_explain_error(drawing, picture)])
         if json:
-            write_json(json, _describe_run(drawing, arguments, picture.averaged))
+            write_json(json, _describe_run(drawing, picture))
     if files.black:
         print_notes(["the picture is black: the camera sees nothing that is lit"])
     if files.names:
         print(f"wrote {files.describe(picture.number + 1)}", file=sys.stderr)
     if picture.interrupted:
-        counts = f"{picture.averaged} of {arguments.accumulate}"
-        print(f"deferred-ir: interrupted: averaged {counts} frames", file=sys.stderr)
+        most = "" if arguments.error else f" of {drawing.accumulate}"
+        print(f"deferred-ir: interrupted: averaged {picture.averaged}{most} frames", file=sys.stderr)
         return 130
-    return 0
+    return int(drawing.missed(picture))
 
 
 def _open_renderer(arguments: argparse.Namespace, scene: Scene, settings: Mapping[str, Any]) -> Renderer:
     """Open a renderer with the options, over what the scene file asks for."""
     from deferred_ir.engine.renderer import Renderer
-    from deferred_ir.engine.settings import choose_graph, choose_settings, choose_size
+    from deferred_ir.engine.settings import NO_SETTINGS, choose_for_error, choose_graph, choose_settings, choose_size
 
-    graph = choose_graph(arguments.graph, scene.render)
+    graph, start = choose_graph(arguments.graph, scene.render), NO_SETTINGS
+    if arguments.error is not None:
+        graph, start = choose_for_error(arguments.graph, scene.render)
     return Renderer(
         choose_size(arguments.size, scene.render),
         graph,
         arguments.device,
-        set=choose_settings(graph, scene.render, settings, arguments.vpls),
+        set={**start, **choose_settings(graph, scene.render, settings, arguments.vpls)},
         reuse=arguments.reuse,
         keep_all=arguments.keep_all,
     )
@@ -109,34 +117,38 @@ def _open_renderer(arguments: argparse.Namespace, scene: Scene, settings: Mappin
 def _prepare_drawing(renderer: Renderer, scene: Scene, files: ImageFiles, arguments: argparse.Namespace) -> Drawing:
     """Plan what the files need. With --json a first frame compiles and allocates: that is not what frames cost."""
     from deferred_ir.cli.drawing import Drawing
+    from deferred_ir.engine.accumulation import count_most
     from deferred_ir.engine.measurement import Measurement
     from deferred_ir.engine.settings import choose_seed
 
-    outputs = files.choose_outputs(renderer.graph().outputs, averaged=arguments.accumulate > 1)
+    most, error = count_most(arguments.accumulate, arguments.error), arguments.error
+    known = renderer.graph().outputs
+    outputs = files.choose_outputs(known, averaged=most > 1, estimated=error is not None)
     plan = renderer.plan(scene, outputs=None if arguments.keep_all else outputs)
     seed = choose_seed(arguments.seed, scene.render)
     measurement = Measurement() if arguments.json is not None else None
     if measurement:
         renderer.draw(scene, plan, seed=seed)
         renderer.reset()
-    return Drawing(renderer, scene, plan, seed, arguments.frames, arguments.accumulate, measurement)
+    return Drawing(renderer, scene, plan, seed, arguments.frames, most, error, measurement)
 
 
-def _describe_run(drawing: Drawing, arguments: argparse.Namespace, averaged: int) -> dict[str, Any]:
-    """Collect what RUN.json holds; `averaged`: frames in the last image."""
-    from deferred_ir.engine.settings import choose_graph
+def _describe_run(drawing: Drawing, last: Picture) -> dict[str, Any]:
+    """Collect what RUN.json holds; `last`: the last picture."""
     from deferred_ir.report.left_out import measure_passes
     from deferred_ir.report.lost_light import estimate_for
-    from deferred_ir.report.run_json import add_measurements, describe_run
+    from deferred_ir.report.run_json import add_measurements, describe_error, describe_run
 
     renderer, scene, measurement = drawing.renderer, drawing.scene, drawing.measurement
     assert measurement is not None
     renderer.finish(measurement)
-    graph = choose_graph(arguments.graph, scene.render)
     plan, seed = drawing.plan, drawing.seed
+    graph, name = renderer.graph(), str(renderer.setup.name)
     run = describe_run(
-        renderer, scene, graph, renderer.graph(), plan, seed=seed, measurement=measurement, accumulated=averaged
+        renderer, scene, name, graph, plan, seed=seed, measurement=measurement, accumulated=last.averaged
     )
+    if last.estimate:
+        run["error"] = describe_error(last.estimate, plan, target=drawing.error)
     bias = estimate_for(plan, renderer.tracer)
     # Last, for it draws over what the frames have left.
     add_measurements(run, bias=bias, passes=measure_passes(renderer, scene.at(run["time"]), plan, seed=seed))
@@ -149,3 +161,18 @@ def _explain_unfilled(drawing: Drawing) -> Iterator[str]:
     for step in drawing.plan.steps:
         if note := step.work.explain_unfilled(step.name, figures, drawing.accumulate):
             yield note
+
+
+def _explain_error(drawing: Drawing, last: Picture) -> Iterator[str]:
+    """Yield how large the error of the last picture is, where that was asked for, and what the estimate cannot see."""
+    from deferred_ir.report.shared_errors import list_shared_errors
+
+    if drawing.error is None:
+        return
+    if last.estimate is None:
+        yield "error unknown: a single frame does not tell it"
+        return
+    missed = f", not the {drawing.error:g} asked for" if drawing.missed(last) else ""
+    yield f"error about {last.estimate.error:.2g} (relMSE) after {last.averaged} frames{missed}"
+    if shared := list_shared_errors(drawing.plan):
+        yield f"what all frames get wrong alike comes on top: {'; '.join(shared)}"

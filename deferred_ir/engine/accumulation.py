@@ -27,6 +27,8 @@ LAP = "accumulate"
 """Name of the time that adding up takes, among those of passes."""
 FEWEST = 2
 """Frames that tell an error."""
+FIRST_LOOK = 4
+"""Frames before the first look at a given error: with fewer the estimate is too often off by more than half."""
 MOST = 1024
 """Frames for a given error, unless another number is asked for."""
 
@@ -133,7 +135,7 @@ class Accumulation:
 
         Yields the latest estimate after each frame, None without `error`.
         """
-        look, latest = FEWEST, None
+        look, latest = FIRST_LOOK, None
         while self.frames < most and not (error and latest and latest.error <= error):
             self.draw()
             if error and self.frames >= min(look, most):

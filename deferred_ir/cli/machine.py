@@ -209,6 +209,7 @@ def _check_context(device: str) -> list[Check]:
         found, _, mend = str(error).rpartition("; ")
         return [Check(name, False, found, mend)]
     extensions, info, code = context.extensions, context.info, context.version_code
+    costs = _check_costs(f"{opened.name}, OpenGL {info['GL_VERSION']}")
     devices.close(context, loader)
     enough = code >= devices.FLOOR
     return [
@@ -218,7 +219,23 @@ def _check_context(device: str) -> list[Check]:
             Check(feature, feature in extensions, "yes" if feature in extensions else fallback, optional=True)
             for feature, fallback in OPTIONAL_FEATURES.items()
         ),
+        costs,
     ]
+
+
+def _check_costs(driver: str) -> Check:
+    """Look for what frames cost with this driver, which `render --within` starts from."""
+    from deferred_ir.tuning import machine_costs
+
+    machine = machine_costs.describe_machine(driver)
+    costs, anew = machine_costs.read(machine), "`deferred-ir doctor --calibrate` measures"
+    if costs is None:
+        return Check(
+            "costs of frames", False, f"not known; render --within measures them first, {anew} now", optional=True
+        )
+    slowest = max(costs.ms[-1])
+    found = f"measured {costs.measured}, up to {slowest:.0f} ms, kept in {machine_costs.find_file(machine)}"
+    return Check("costs of frames", True, found, f"{anew} anew", optional=True)
 
 
 def _check_extras() -> list[Check]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Container, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Container, Mapping, Sequence
+from contextlib import nullcontext
 from numbers import Integral
 from pathlib import Path
 from types import TracebackType
@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.errors import SettingError
-from deferred_ir.engine.accumulation import Accumulation, count_most
 from deferred_ir.engine.executor import Executor
+from deferred_ir.engine.goals import Goals
 from deferred_ir.engine.measurement import Measurement
-from deferred_ir.engine.settings import DEFAULT_GRAPH, FOR_ERROR
-from deferred_ir.engine.setup import IMAGES, UNFILTERED, Setup, check_images
+from deferred_ir.engine.settings import DEFAULT_GRAPH
+from deferred_ir.engine.setup import IMAGES, Setup, check_images
 from deferred_ir.frame.facts import collect_facts
 from deferred_ir.frame.frame import PARTS, Frame
 from deferred_ir.frame.scene_buffers import SceneBuffers
@@ -36,8 +36,8 @@ from deferred_ir.scene.scene import Scene
 class Renderer:
     """Renders scenes through a render graph.
 
-    size: (width, height) in pixels. graph: a built-in name or a graph file; None: `deferred`, or for a given error
-    `engine.settings.FOR_ERROR`. device: see `deferred-ir devices`.
+    size: (width, height) in pixels. graph: a built-in name or a graph file; None: `deferred`, or `resampled` for a
+    given error or time. device: see `deferred-ir devices`.
     set: parameters of passes, {"pass.param": value}. passes: pass classes of your own, {type name: class}, which a
     graph file then names. reuse: a pass is skipped while its inputs are unchanged; else every
     frame redoes everything. keep_all: leave nothing out that this scene or view does not need; the pixels are the same.
@@ -62,7 +62,7 @@ class Renderer:
         if not isinstance(size, Sequence) or len(size) != 2 or not all(isinstance(n, Integral) and n > 0 for n in size):
             raise SettingError(f"size {size!r}: wants two whole numbers above 0, width and height")
         self.reuse, self._keep_all = reuse, keep_all
-        self._graph_named = graph is not None
+        self._goals = Goals(self, named=graph is not None)
         name = DEFAULT_GRAPH if graph is None else graph
         self.setup = Setup((int(size[0]), int(size[1])), name, dict(set or {}), dict(passes or {}))
         self.graph()  # a fault in the graph shows before a context is made
@@ -135,36 +135,18 @@ class Renderer:
         time: float = 0.0,
         accumulate: int | None = None,
         error: float | None = None,
+        within: float | None = None,
     ) -> Image:
         """Render one image of `scene` at `time` seconds with `vpls` VPLs (None: as many as the graph says).
 
         accumulate: frames with fresh samples that are averaged in it; `Accumulation` adds them up one by one. error:
         add frames until their estimate of the image's relMSE is at most this; `accumulate` is then the most frames
-        (None: 1024), and `error_estimate` of the image says how far it came.
+        (None: 1024), and `error_estimate` of the image says how far it came. within: seconds that the image may take
+        once the renderer runs; what is not given is chosen so, by frames that are measured before the first such image.
         """
-        most = count_most(accumulate, error)
-        with self._setup_for(error):
-            wanted = IMAGES if error is None else (*IMAGES, UNFILTERED)
-            plan = self.plan(scene, vpls, [name for name in self.graph(vpls).outputs if name in wanted])
-            if most == 1:
-                self.draw(scene, plan, seed=seed, time=time)
-                return self.read(plan)
-            mean = Accumulation(self, scene, plan, seed=seed, time=time, blend=error is not None)
-            for _ in mean.draw_until(error, most):
-                pass
-            return mean.image()
-
-    @contextmanager
-    def _setup_for(self, error: float | None) -> Iterator[None]:
-        """Draw with the graph that is made for a given error, where none was named."""
-        before = self.setup
-        if error is not None and not self._graph_named:
-            graph, set = FOR_ERROR
-            self.configure(graph=graph, set={**set, **before.set})
-        try:
-            yield
-        finally:
-            self.setup = before
+        return self._goals.render(
+            scene, vpls=vpls, seed=seed, time=time, accumulate=accumulate, error=error, within=within
+        )
 
     def draw(
         self,

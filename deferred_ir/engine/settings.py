@@ -18,7 +18,6 @@ VPLS = "vpls"
 """Role of the parameters that are the number of VPLs."""
 DEFAULT_GRAPH = "deferred"
 DEFAULT_SIZE = (512, 512)
-NO_SETTINGS: Mapping[str, Any] = {}
 FOR_ERROR: tuple[str, Mapping[str, Any]] = "resampled", {"sample_pixels.scale": 1}
 """Graph and parameters for a given error unless others are named: its frames share no error that they cannot tell."""
 
@@ -28,10 +27,12 @@ def choose_graph(name: str | None, defaults: RenderDefaults) -> str:
     return name if name is not None else defaults.graph or DEFAULT_GRAPH
 
 
-def choose_for_error(name: str | None, defaults: RenderDefaults) -> tuple[str, Mapping[str, Any]]:
-    """Return the graph for an image of a given error, and parameters that --set may change: FOR_ERROR unless named."""
+def choose_start(
+    name: str | None, defaults: RenderDefaults, start: tuple[str, Mapping[str, Any]]
+) -> tuple[str, Mapping[str, Any]]:
+    """Return a graph, and parameters that --set may change: `start` unless --graph or the scene file names a graph."""
     named = name if name is not None else defaults.graph
-    return FOR_ERROR if named is None else (named, NO_SETTINGS)
+    return start if named is None else (named, {})
 
 
 def choose_seed(seed: int | None, defaults: RenderDefaults) -> int:

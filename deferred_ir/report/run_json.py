@@ -58,6 +58,7 @@ def describe_run(
         "time": (len(measurement.frame_ms) - 1) / FRAMES_PER_SECOND if scene.moves else 0.0,
         "accumulated": accumulated,
         "error": None,
+        "within": None,
         "frame_ms": measurement.median_frame_ms(),
         "passes": passes,
         **_read_figures(list_figures(graph), measurement.counters),

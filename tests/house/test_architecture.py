@@ -10,7 +10,7 @@ from source_imports import MODULES, PROJECT, ROOT, imports
 
 ROOMS = (
     *("base", "sampling", "graph", "gl", "scene", "meshes", "rays", "output", "loading", "vpls", "frame", "pool"),
-    *("shadows", "passes", "engine", "report", "truth", "viewer", "profiling", "cli"),
+    *("shadows", "passes", "tuning", "engine", "report", "truth", "viewer", "profiling", "cli"),
 )
 MOST_FILES = 12
 LONGEST = 300

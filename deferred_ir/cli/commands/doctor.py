@@ -11,12 +11,20 @@ ORDER = 90
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of `deferred-ir doctor`."""
     parser.add_argument("--device", default="auto", metavar="D", help="the device to check (default: auto)")
+    calibrate = "measure anew what frames cost here, which render --within starts from; takes about ten seconds"
+    parser.add_argument("--calibrate", action="store_true", help=calibrate)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print all checks. Returns 1 if something that is required is missing."""
     from deferred_ir.cli import machine
 
+    if arguments.calibrate:
+        from deferred_ir.engine.renderer import Renderer
+        from deferred_ir.engine.within import measure_machine
+
+        with Renderer(device=arguments.device) as renderer:
+            measure_machine(renderer)
     results = machine.run_checks(arguments.device)
     print(machine.format_report(results))
     return 0 if machine.is_healthy(results) else 1

@@ -16,6 +16,7 @@ from deferred_ir.cli.options import (
     add_set,
     add_size,
     add_vpls,
+    parse_duration,
     parse_positive,
     parse_relmse,
     print_notes,
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from deferred_ir.cli.drawing import Drawing, Picture
     from deferred_ir.cli.image_files import ImageFiles
     from deferred_ir.engine.renderer import Renderer
+    from deferred_ir.engine.within import Choice
+    from deferred_ir.graph.graph import Plan
     from deferred_ir.scene.scene import Scene
 
 HELP = "Render a scene to images."
@@ -46,7 +49,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     accumulate = "average K frames of fresh samples in each image; Ctrl-C keeps what is done"
     parser.add_argument("--accumulate", type=parse_positive, metavar="K", help=accumulate)
     error = "average frames until their estimate of the image's relMSE is at most E; at most K frames (default: 1024)"
-    parser.add_argument("--error", type=parse_relmse, metavar="E", help=error)
+    goal = parser.add_mutually_exclusive_group()
+    goal.add_argument("--error", type=parse_relmse, metavar="E", help=error)
+    within = "choose what is not given so that an image takes at most T, such as 0.2s or 200ms, once all is loaded"
+    goal.add_argument("--within", type=parse_duration, metavar="T", help=within)
     parser.add_argument("--reuse", action="store_true", help="skip a pass while its inputs are unchanged")
     keep_all = "disable scene-specific optimisations; the pixels are the same, for testing"
     parser.add_argument("--keep-all", action="store_true", help=keep_all)
@@ -73,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     print_notes([*list_notes(scene), *files.list_notes()])
     with _open_renderer(arguments, scene, settings) as renderer:
         print(f"OpenGL on {renderer.gpu.device}", file=sys.stderr)
-        drawing = _prepare_drawing(renderer, scene, files, arguments)
+        drawing, choice = _prepare_drawing(renderer, scene, files, arguments)
         try:
             for picture in drawing.draw():
                 files.save(picture, drawing.read)
@@ -84,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
             return 130
         print_notes([*_explain_unfilled(drawing), *_explain_error(drawing, picture)])
         if json:
-            write_json(json, _describe_run(drawing, picture))
+            write_json(json, _describe_run(drawing, picture, choice, arguments.within))
     if files.black:
         print_notes(["the picture is black: the camera sees nothing that is lit"])
     if files.names:
@@ -99,42 +105,61 @@ def run(arguments: argparse.Namespace) -> int:
 def _open_renderer(arguments: argparse.Namespace, scene: Scene, settings: Mapping[str, Any]) -> Renderer:
     """Open a renderer with the options, over what the scene file asks for."""
     from deferred_ir.engine.renderer import Renderer
-    from deferred_ir.engine.settings import NO_SETTINGS, choose_for_error, choose_graph, choose_settings, choose_size
+    from deferred_ir.engine.settings import DEFAULT_GRAPH, FOR_ERROR, choose_settings, choose_size, choose_start
+    from deferred_ir.tuning.ladder import GRAPH
 
-    graph, start = choose_graph(arguments.graph, scene.render), NO_SETTINGS
+    start: tuple[str, Mapping[str, Any]] = DEFAULT_GRAPH, {}
     if arguments.error is not None:
-        graph, start = choose_for_error(arguments.graph, scene.render)
+        start = FOR_ERROR
+    elif arguments.within is not None:
+        start = GRAPH, {}
+    graph, set = choose_start(arguments.graph, scene.render, start)
     return Renderer(
         choose_size(arguments.size, scene.render),
         graph,
         arguments.device,
-        set={**start, **choose_settings(graph, scene.render, settings, arguments.vpls)},
+        set={**set, **choose_settings(graph, scene.render, settings, arguments.vpls)},
         reuse=arguments.reuse,
         keep_all=arguments.keep_all,
     )
 
 
-def _prepare_drawing(renderer: Renderer, scene: Scene, files: ImageFiles, arguments: argparse.Namespace) -> Drawing:
-    """Plan what the files need. With --json a first frame compiles and allocates: that is not what frames cost."""
+def _prepare_drawing(
+    renderer: Renderer, scene: Scene, files: ImageFiles, arguments: argparse.Namespace
+) -> tuple[Drawing, Choice | None]:
+    """Plan what the files need; for a given time, choose how first.
+
+    With --json a first frame compiles and allocates: that is not what frames cost.
+    """
     from deferred_ir.cli.drawing import Drawing
     from deferred_ir.engine.accumulation import count_most
     from deferred_ir.engine.measurement import Measurement
     from deferred_ir.engine.settings import choose_seed
+    from deferred_ir.engine.within import choose
 
     most, error = count_most(arguments.accumulate, arguments.error), arguments.error
-    known = renderer.graph().outputs
-    outputs = files.choose_outputs(known, averaged=most > 1, estimated=error is not None)
-    plan = renderer.plan(scene, outputs=None if arguments.keep_all else outputs)
+    averaged = most > 1 or arguments.within is not None
+    outputs = files.choose_outputs(renderer.graph().outputs, averaged=averaged, estimated=error is not None)
+
+    def make_plan() -> Plan:
+        return renderer.plan(scene, outputs=None if arguments.keep_all else outputs)
+
+    choice = None
+    if arguments.within is not None:
+        choice = choose(renderer, scene, arguments.within, make_plan, frames=arguments.accumulate)
+        print_notes(_explain_choice(choice, arguments.within))
+        most = choice.frames
+    plan = make_plan()
     seed = choose_seed(arguments.seed, scene.render)
     measurement = Measurement() if arguments.json is not None else None
     if measurement:
         renderer.draw(scene, plan, seed=seed)
         renderer.reset()
-    return Drawing(renderer, scene, plan, seed, arguments.frames, most, error, measurement)
+    return Drawing(renderer, scene, plan, seed, arguments.frames, most, error, measurement), choice
 
 
-def _describe_run(drawing: Drawing, last: Picture) -> dict[str, Any]:
-    """Collect what RUN.json holds; `last`: the last picture."""
+def _describe_run(drawing: Drawing, last: Picture, choice: Choice | None, within: float | None) -> dict[str, Any]:
+    """Collect what RUN.json holds; `last`: the last picture, `choice`: what was chosen for images `within` seconds."""
     from deferred_ir.report.left_out import measure_passes
     from deferred_ir.report.lost_light import estimate_for
     from deferred_ir.report.run_json import add_measurements, describe_error, describe_run
@@ -149,6 +174,8 @@ def _describe_run(drawing: Drawing, last: Picture) -> dict[str, Any]:
     )
     if last.estimate:
         run["error"] = describe_error(last.estimate, plan, target=drawing.error)
+    if choice and within:
+        run["within"] = {"target_ms": within * 1e3, "predicted_ms": choice.ms, "arguments": choice.arguments}
     bias = estimate_for(plan, renderer.tracer)
     # Last, for it draws over what the frames have left.
     add_measurements(run, bias=bias, passes=measure_passes(renderer, scene.at(run["time"]), plan, seed=seed))
@@ -176,3 +203,12 @@ def _explain_error(drawing: Drawing, last: Picture) -> Iterator[str]:
     yield f"error about {last.estimate.error:.2g} (relMSE) after {last.averaged} frames{missed}"
     if shared := list_shared_errors(drawing.plan):
         yield f"what all frames get wrong alike comes on top: {'; '.join(shared)}"
+
+
+def _explain_choice(choice: Choice, within: float) -> Iterator[str]:
+    """Yield what was chosen for images within so many seconds, and whether that is fast enough."""
+    import shlex
+
+    yield f"chosen for {within:g} s, about {choice.ms:.0f} ms an image: {shlex.join(choice.arguments)}"
+    if choice.ms > within * 1e3:
+        yield f"nothing faster is known here; a smaller --size takes less than {choice.ms:.0f} ms"

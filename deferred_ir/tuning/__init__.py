@@ -1,0 +1,1 @@
+"""What settings cost on this machine, and which of them fit a given time."""

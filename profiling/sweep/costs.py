@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.progress import progress_bar
-from deferred_ir.engine.renderer import IMAGES, Renderer
+from deferred_ir.engine.renderer import Renderer
+from deferred_ir.engine.setup import IMAGES
 from deferred_ir.profiling.sweep import edge_mask
 from deferred_ir.profiling.sweep.sweep import FRAMES, Sweep, Task
 from deferred_ir.scene.scene import Scene

@@ -22,7 +22,7 @@ RUNGS: tuple[Settings, ...] = (
     {
         "sample_pixels.scale": 4,
         "vpl.candidates": 8,
-        "propose_vpls.entries": 128,
+        "list_vpls.entries": 128,
         "choose_vpls.draws": 8,
         "choose_vpls.rays": 1,
         "near_field.samples": 0.25,
@@ -30,11 +30,11 @@ RUNGS: tuple[Settings, ...] = (
     {
         "sample_pixels.scale": 3,
         "vpl.candidates": 16,
-        "propose_vpls.entries": 256,
+        "list_vpls.entries": 256,
         "choose_vpls.draws": 16,
         "choose_vpls.rays": 2,
     },
-    {"vpl.candidates": 16, "propose_vpls.entries": 256, "choose_vpls.draws": 16, "choose_vpls.rays": 2},
+    {"vpl.candidates": 16, "list_vpls.entries": 256, "choose_vpls.draws": 16, "choose_vpls.rays": 2},
     {},
     {"choose_vpls.draws": 64, "filter_samples.steps": 4},
     {"sample_pixels.scale": 1, "choose_vpls.rays": 2},

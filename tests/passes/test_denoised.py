@@ -93,7 +93,7 @@ def test_a_change_of_quality_runs_the_denoiser_and_what_follows(renderer):
     one, scene = renderer((32, 24), "denoised", set={"vpl.count": 8}, reuse=True), room()
     balanced = one.render(scene)
     one.configure(set={"vpl.count": 8, "denoise_samples.quality": "fast"})
-    plan = one.plan(scene)
+    plan = one.plan(scene, outputs=["radiance", "display"])
     one.draw(scene, plan)
     ran = {step.name for step in plan.steps} - set(one.executor.skipped)
     assert ran == {"denoise_samples", "blend_samples", "lighting", "tonemap"}

@@ -56,6 +56,11 @@ class DenoiseSamples(Pass):
         """Leave the pass out where there are no VPLs."""
         return explain_no_vpls(facts)
 
+    def explain_shared_error(self, facts: Facts) -> str | None:
+        """Say that light is denoised."""
+        del facts
+        return "the denoiser blurs light inside surfaces"
+
     def execute(self, frame: Frame, io: Io) -> None:
         """Denoise on the CPU."""
         del frame

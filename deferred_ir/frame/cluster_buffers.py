@@ -61,7 +61,7 @@ class ClusterBuffers:
         The program reads `position` and `view_index`.
         """
         pairs = np.ascontiguousarray(visible.T)
-        light = lights.astype("i4")[np.flatnonzero(pairs) % max(len(lights), 1)]
+        light = np.broadcast_to(lights.astype("i4"), pairs.shape)[pairs]
         instances = np.count_nonzero(pairs, axis=1)
         commands = self._each.copy()
         commands["instances"], commands["base_instance"] = instances, np.cumsum(instances) - instances

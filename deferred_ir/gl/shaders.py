@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -86,11 +86,12 @@ def flatten(name: str, folders: Iterable[Path], defines: Mapping[str, int | floa
 class Program:
     """A linked program. name: of its first file. arrays: the vertex arrays made for it, by what they draw."""
 
-    def __init__(self, gpu: Gpu, name: str, glsl: Any, sources: Iterable[Source]) -> None:
+    def __init__(self, gpu: Gpu, name: str, glsl: Any, sources: Collection[Source]) -> None:
         self.gpu, self.name, self.glsl = gpu, name, glsl
         self.arrays: dict[Any, Any] = {}
         members = {member: glsl[member] for member in glsl}
         self.text = "".join(source.text for source in sources)
+        self._words = frozenset().union(*(source.words for source in sources))
         self._uniforms = {key: m for key, m in members.items() if type(m).__name__ == "Uniform"}
         self.attributes = [
             key for key, m in members.items() if type(m).__name__ == "Attribute" and not key.startswith("gl_")
@@ -103,7 +104,7 @@ class Program:
             uniform = self._uniforms.get(key)
             if uniform is not None:
                 uniform.value = value
-            elif not re.search(rf"\b{key}\b", self.text):
+            elif key not in self._words:
                 raise ShaderError(f"{self.name}: no uniform '{key}'{did_you_mean(key, self._uniforms)}")
 
     def has(self, name: str) -> bool:

@@ -1,4 +1,4 @@
-"""Which VPLs may light which tiles of the screen, as a port: a bit for each pair, in a texture. No OpenGL.
+"""The port that says which VPLs may light which tiles of the screen, a bit for each pair in a texture. No OpenGL.
 
 For each group of GROUP VPLs the texture has TILES x TILES texels, ACROSS groups side by side and further ones above.
 shaders/lib/lights/tiles.glsl finds the same places.

@@ -19,7 +19,11 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.pool.effort import accept_effort, read_effort
 from deferred_ir.pool.samples import draw_samples, read_layout
+
+MOST_RAYS = 16
+"""Four in a texture, and OpenGL promises eight to draw into, half of which take the weights."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +31,7 @@ class Params:
     """Parameters of the choice."""
 
     draws: int = param(32, lo=1, hi=4096, doc="VPLs of the list that a sample looks at (M); `rays` divides it.")
-    rays: int = param(4, lo=1, hi=4, doc="VPLs that it keeps (K), each of which a ray is traced to.")
+    rays: int = param(4, lo=1, hi=MOST_RAYS, doc="VPLs that it keeps (K), each of which a ray is traced to.")
 
 
 class ChooseVpls(Pass):
@@ -42,22 +46,31 @@ class ChooseVpls(Pass):
         "pixels": Input("their pixels", format="r32ui"),
         "list_positions": Input("VPLs for each tile: position, power times weight", format="rgba32f"),
         "list_normals": Input("normal, clamp^2", format="rgba32f"),
+        "effort": accept_effort("factor on `draws` and `rays`"),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return two textures of the frame's size. Raises GraphError where a list is too short."""
-        p, lists = self.params, inputs["list_positions"]
+        lists, effort = inputs["list_positions"], read_effort(inputs)
         assert isinstance(lists, Texture)
         entries = lists.size[0] if lists.size else 0
-        if p.draws % p.rays or entries % p.draws:
+        draws, rays = self.params.draws * effort, self.params.rays * effort
+        if rays > MOST_RAYS:
             raise GraphError(
-                f"draws {p.draws}, rays {p.rays} and {entries} entries of a list: each must divide the next; "
+                f"rays {self.params.rays} times {effort}, the effort for so many VPLs: at most {MOST_RAYS}; "
+                f"use rays {MOST_RAYS // effort}"
+            )
+        if draws % rays or entries % draws:
+            raise GraphError(
+                f"rays {rays}, draws {draws} and {entries} entries of a list: each must divide the next; "
                 f"try rays 4, draws 32 and list_vpls.entries 512"
             )
-        defines = {"RAYS": p.rays}
+        layers = -(-rays // 4)
+        defines = {"RAYS": rays, "CHOICE_LAYERS": layers}
+        which, weights = Texture("rgba32ui", layers=layers), Texture("rgba32f", layers=layers)
         return {
-            "choices": Output("places in the lists, tile by tile", Texture("rgba32ui"), defines, transient=True),
-            "weights": Output("by which each choice stands for others", Texture("rgba32f"), transient=True),
+            "choices": Output("places in the lists, tile by tile; four a layer", which, defines, transient=True),
+            "weights": Output("by which each choice stands for others", weights, transient=True),
         }
 
     def depends(self) -> frozenset[str]:
@@ -70,7 +83,8 @@ class ChooseVpls(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Choose."""
-        defines = {"SMOOTH": int(frame.smooth), "DRAWS": self.params.draws}
+        draws = self.params.draws * read_effort(io.step.descriptions)
+        defines = {"SMOOTH": int(frame.smooth), "DRAWS": draws}
         program = io.program("choose_vpls.frag", defines=defines)
         program.set(frame_seed=frame.seed & 0x7FFFFFFF, area=frame.scene.geometry.diagonal**2)
         draw_samples(io, program, read_layout(io))

@@ -56,9 +56,9 @@ class DenoiseSamples(Pass):
         """Leave the pass out where there are no VPLs."""
         return explain_no_vpls(facts)
 
-    def explain_shared_error(self, facts: Facts) -> str | None:
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
         """Say that light is denoised."""
-        del facts
+        del facts, inputs
         return "the denoiser blurs light inside surfaces"
 
     def execute(self, frame: Frame, io: Io) -> None:

@@ -70,9 +70,9 @@ class FilterSamples(Pass):
         """Leave the pass out where there are no VPLs."""
         return explain_no_vpls(facts)
 
-    def explain_shared_error(self, facts: Facts) -> str | None:
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
         """Say that light is filtered."""
-        del facts
+        del facts, inputs
         return "the filter blurs light inside surfaces" if self.params.steps else None
 
     def execute(self, frame: Frame, io: Io) -> None:

@@ -52,9 +52,9 @@ class Gather(Pass):
         """The camera, to reconstruct lonely pixels' positions from the depth; and the seed, which shifts the window."""
         return frozenset({"camera", "seed"})
 
-    def explain_shared_error(self, facts: Facts) -> str | None:
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
         """Say that light is filtered."""
-        del facts
+        del facts, inputs
         return "the filter blurs the light of single VPLs"
 
     def execute(self, frame: Frame, io: Io) -> None:

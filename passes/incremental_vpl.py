@@ -65,8 +65,9 @@ class IncrementalVpl(Pass):
         stated: Statements = self.params.state_facts(facts)
         return stated
 
-    def explain_shared_error(self, facts: Facts) -> str | None:
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
         """Return how VPLs lose light."""
+        del inputs
         lost: str | None = self.params.explain_lost_light(facts)
         return lost
 

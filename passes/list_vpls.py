@@ -13,6 +13,7 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.pool.effort import accept_effort, read_effort
 from deferred_ir.pool.proposals import TILES, count_groups
 
 
@@ -31,13 +32,13 @@ class ListVpls(Pass):
         "vpls": Input("the VPLs of the pool", format="vpl"),
         "pool": Input("the same as a texture", format="rgba32f"),
         "chances": Input("of each group and all before it, a row for each tile", format="r32f"),
+        "effort": accept_effort("factor on `entries`"),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return textures with a row for each tile and a column for each entry."""
-        del inputs
-        size = self.params.entries, TILES**2
-        defines = {"LIST_ENTRIES": self.params.entries, "TILES": TILES}
+        entries = self.params.entries * read_effort(inputs)
+        size, defines = (entries, TILES**2), {"LIST_ENTRIES": entries, "TILES": TILES}
         return {
             "numbers": Output("numbers of the VPLs in the pool", Texture("r32ui", size)),
             "list_positions": Output(

@@ -20,6 +20,7 @@ from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.pool.effort import accept_effort, read_effort
 from deferred_ir.rays.pixel_surfaces import PixelJob
 from deferred_ir.vpls.clamp_residual import trace_residual
 from deferred_ir.vpls.interleaving import SharesMeta
@@ -47,6 +48,7 @@ class NearField(Pass):
         "depth": Input("reversed depth; or else `positions`", format="depth32f", optional=True),
         "positions": Input("where samples are, if these ask and not all pixels", format="rgba32f", optional=True),
         "normals": Input("shading and geometric normal, of pixels or of samples", format="rgba16"),
+        "effort": accept_effort("factor on `samples`"),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
@@ -84,7 +86,8 @@ class NearField(Pass):
             seen = frame.read_surfaces(io["depth"], io["normals"])
         job = PixelJob(frame.tracer(), seen, frame.size, block, frame.seed)
         bounces = io.meta("vpls", VplsMeta).bounces
-        image = trace_residual(job, read_limits(vpls), samples=self.params.samples, bounces=bounces)
+        samples = self.params.samples * read_effort(io.step.descriptions)
+        image = trace_residual(job, read_limits(vpls), samples=samples, bounces=bounces)
         io["residual"].upload(image)
 
 

@@ -20,7 +20,7 @@ from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.vpls.interleaving import SharesMeta, choose_window_side
 
-IMAGES = ("window", "lonely_pixels", "missing", "lonely_count")
+IMAGES = ("lonely_pixels", "missing", "lonely_count")
 """Outputs that the shader stores into, in the order of their image units."""
 TAPS = 16
 """Pixels of the window that a layer describes."""

@@ -36,11 +36,11 @@ class ProposeVpls(Pass):
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return a row for each tile and a column for each group."""
         del inputs
-        texture = Texture("r32f", (GROUPS, TILES**2))
+        scores = Texture("rgba32f", (GROUPS // 4, TILES**2))
         before = "the chance of each group and of all before it; 0 in a pool without power"
         return {
-            "scores": Output("what each group would bring to each tile", texture),
-            "chances": Output(before, texture, attach=False),
+            "scores": Output("what groups would bring to each tile, four a texel", scores),
+            "chances": Output(before, Texture("r32f", (GROUPS, TILES**2)), attach=False),
         }
 
     def depends(self) -> frozenset[str]:
@@ -60,7 +60,7 @@ class ProposeVpls(Pass):
         count = count_groups(len(io["vpls"].records))
         power = io["groups"].read()[0, :count, 3]
         chances = np.zeros((TILES**2, GROUPS), np.float32)
-        chances[:, :count] = add_up_chances(io["scores"].read()[:, :count, 0], power)
+        chances[:, :count] = add_up_chances(io["scores"].read().reshape(TILES**2, GROUPS)[:, :count], power)
         io["chances"].upload(chances[..., None])
 
 

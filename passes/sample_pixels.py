@@ -21,6 +21,7 @@ from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.pool.effort import accept_effort, read_effort
 from deferred_ir.pool.layout import LONELY, Layout
 from deferred_ir.pool.samples import describe_layout, draw_samples, write_layout
 
@@ -48,12 +49,13 @@ class SamplePixels(Pass):
     inputs: ClassVar[Mapping[str, Input]] = {
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
+        "effort": accept_effort("by which `scale` is divided"),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return textures of the frame's size, which have room for all pixels."""
-        del inputs
-        defines = {"SCALE": self.params.scale}
+        scale = self._divide_scale(inputs)
+        defines = {"SCALE": scale}
         where = "position, and depth of view; 0 where there is no sample or nothing was seen"
         weights = "what the pixel takes of the four samples around it, or the texel of its own sample"
         return {
@@ -72,17 +74,23 @@ class SamplePixels(Pass):
         """Leave the pass out where there are no VPLs."""
         return explain_no_vpls(facts)
 
-    def explain_shared_error(self, facts: Facts) -> str | None:
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
         """Return how far samples are apart."""
         del facts
-        return f"light is blended from samples {self.params.scale} pixels apart" if self.params.scale > 1 else None
+        scale = self._divide_scale(inputs)
+        return f"light is blended from samples {scale} pixels apart" if scale > 1 else None
+
+    def _divide_scale(self, inputs: Mapping[str, Description | None]) -> int:
+        scale: int = self.params.scale
+        return max(scale // read_effort(inputs), 1)
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Find lonely pixels, then gather the samples' surfaces."""
-        layout = Layout.of_frame(frame.size, self.params.scale, frame.seed)
+        scale = self._divide_scale(io.step.descriptions)
+        layout = Layout.of_frame(frame.size, scale, frame.seed)
         defines = {"SMOOTH": int(frame.smooth)}
         listed = np.zeros(0, int)
-        if self.params.scale > 1:
+        if scale > 1:
             blend = self._draw_blend(layout, io, defines)
             listed = np.flatnonzero(blend == LONELY)
             layout = replace(layout, listed=len(listed))

@@ -67,9 +67,9 @@ class ShadowMaps(Pass):
         """Return a reason if the spotlight is dark: then there are no VPLs either."""
         return None if facts[EMITS] else "no light needs one: the spotlight emits nothing"
 
-    def explain_shared_error(self, facts: Facts) -> str | None:
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
         """Return what maps cannot resolve."""
-        del facts
+        del facts, inputs
         return "shadows are as fine as the maps' texels"
 
     def depends(self) -> frozenset[str]:

@@ -1,7 +1,7 @@
 """Find by shadow rays which lights each pixel sees: vpls, G-buffer -> masks, one bit a VPL of its share; spotlight.
 
-Interleaved, a pixel asks so few VPLs that exact rays can cost less than a map of the whole scene for each. The G-buffer
-is read back, Embree traces on the CPU, and the answers go up. The spotlight is asked, too: no light needs a map.
+Interleaved, a pixel asks so few VPLs that on the CPU exact rays can cost less than a map of the whole scene for each.
+The G-buffer is read back, Embree traces, and the answers go up. The spotlight is asked, too: no light needs a map.
 """
 
 from __future__ import annotations
@@ -12,12 +12,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from deferred_ir.frame.costs import estimate_map_cost, estimate_ray_cost
-from deferred_ir.frame.facts import EMITS, PIXELS, SOFTWARE, TRIANGLES
+from deferred_ir.frame.facts import EMITS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.vpl_buffer import read_limits, read_vpls
-from deferred_ir.frame.vpl_params import SHARES
 from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
@@ -32,8 +30,8 @@ from deferred_ir.vpls.ray_masks import BITS, trace_masks
 class Params:
     """Parameters of visibility by rays."""
 
-    visibility: Literal["auto", "maps", "rays"] = param(
-        "auto", doc="Whether VPLs' shadows come from maps or from rays; auto: from whichever should take less time."
+    visibility: Literal["maps", "rays"] = param(
+        "maps", doc="Where VPLs' shadows come from: maps, drawn by OpenGL, or rays, traced on the CPU."
     )
     disc_samples: int = param(
         16,
@@ -66,16 +64,10 @@ class ShadowRays(Pass):
         }
 
     def unneeded(self, facts: Facts) -> str | None:
-        """Leave the pass out where maps are chosen or should take less time."""
+        """Leave the pass out where maps are chosen."""
         if not facts[EMITS]:
             return "the spotlight emits nothing"
-        if self.params.visibility == "maps":
-            return "visibility is 'maps'"
-        maps = estimate_map_cost(facts[TRIANGLES], software=facts[SOFTWARE])
-        rays = estimate_ray_cost(facts[PIXELS], facts[SHARES])
-        if self.params.visibility == "rays" or rays < maps:
-            return None
-        return f"maps should take less time: {maps:.2g} ms for each VPL, rays {rays:.2g} ms"
+        return "visibility is 'maps'" if self.params.visibility == "maps" else None
 
     def depends(self) -> frozenset[str]:
         """The rays' ends: what the camera sees, and the light; and what lies between."""

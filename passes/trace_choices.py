@@ -58,7 +58,9 @@ class TraceChoices(Pass):
             return
         samples, tracer = frame.read_samples(io["positions"], io["sample_normals"]), frame.tracer()
         places = tracer.lift(vpls["position"], vpls["z_axis"])  # off their surfaces, beside which walls may stand
-        choices = io["choices"].read().reshape(-1, 4).take(samples.pixel, axis=0)
+        choices = np.concatenate(
+            [layer.reshape(-1, 4).take(samples.pixel, axis=0) for layer in io["choices"].read()], axis=1
+        )
         bits, rays = find_seen(tracer, samples, places.take(io["numbers"].read().reshape(-1), axis=0), choices, NOBODY)
         image[samples.pixel] = bits
         io["seen"].upload(image.reshape(height, width, 1))

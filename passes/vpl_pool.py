@@ -16,6 +16,7 @@ from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Output, Texture
+from deferred_ir.pool.effort import describe_effort
 from deferred_ir.pool.proposals import GROUPS, draw_members, order_along_curve, share_power
 from deferred_ir.sampling import streams
 from deferred_ir.vpls.cast import NONE, cast
@@ -64,6 +65,7 @@ class VplPool(Pass):
             "vpls": vpls,
             "pool": Output(what, Texture("rgba32f", (3 * ROW, rows)), attach=False),
             "groups": Output(which, Texture("rgba32f", (GROUPS, 2)), attach=False),
+            "effort": describe_effort(self.params.count),
         }
 
     def state_facts(self, facts: Facts) -> Statements:
@@ -71,8 +73,9 @@ class VplPool(Pass):
         stated: Statements = self.params.state_facts(facts)
         return stated
 
-    def explain_shared_error(self, facts: Facts) -> str | None:
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
         """Return how VPLs lose light."""
+        del inputs
         lost: str | None = self.params.explain_lost_light(facts)
         return lost
 

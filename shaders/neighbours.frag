@@ -8,11 +8,10 @@
 
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
-layout(location = TARGET_WINDOW) out uvec4 first_group;  // layer 0 of `window`
-layout(binding = 0, rg32ui) uniform writeonly uimage2DArray window;  // the other layers
-layout(binding = 1, r32ui) uniform writeonly uimage2D lonely_pixels;
-layout(binding = 2, rg32ui) uniform writeonly uimage2D missing;
-layout(binding = 3, r32ui) uniform uimage2D lonely_count;
+layout(location = TARGET_WINDOW) out uvec4 window[GROUPS];
+layout(binding = 0, r32ui) uniform writeonly uimage2D lonely_pixels;
+layout(binding = 1, rg32ui) uniform writeonly uimage2D missing;
+layout(binding = 2, r32ui) uniform uimage2D lonely_count;
 uniform float cosine_squared;  // of the largest angle between normals, at most 90 degrees
 uniform float sine_squared;    // of the largest angle off the pixel's plane
 uniform float fewest;          // taps; with no more the pixel is lonely
@@ -82,9 +81,10 @@ uvec4 group(int g, uvec2 found, uvec2 x, uvec2 y, bool lonely) {
     return pack_group(WindowGroup(bits.x, bits.y, bits.z, lonely));
 }
 
-void write_window(ivec2 pixel, uvec2 found, uvec2 x, uvec2 y, bool lonely) {
-    first_group = group(0, found, x, y, lonely);
-    for (int g = 1; g < GROUPS; ++g) imageStore(window, ivec3(pixel, g), group(g, found, x, y, lonely));
+void write_window(uvec2 found, uvec2 x, uvec2 y, bool lonely) {
+    uvec4 groups[GROUPS];
+    for (int g = 0; g < GROUPS; ++g) groups[g] = group(g, found, x, y, lonely);
+    window = groups;
 }
 
 void main() {
@@ -92,7 +92,7 @@ void main() {
     Centre c = read_centre(pixel, size);
     uvec2 found = uvec2(0u), x = uvec2(0u), y = uvec2(0u);  // taps
     if (c.depth <= 0.0) {  // background
-        write_window(pixel, found, x, y, false);
+        write_window(found, x, y, false);
         return;
     }
     uvec2 bent = uvec2(0u);  // taps in the plane with a normal of their own
@@ -135,7 +135,7 @@ void main() {
                 if (there && i != 0) y |= only(tap);
             }
         }
-    write_window(pixel, found, x, y, lonely);
+    write_window(found, x, y, lonely);
     if (lonely) {
         ivec2 place = list_place(imageAtomicAdd(lonely_count, ivec2(0), 1u), size.x);
         imageStore(lonely_pixels, place, uvec4(pixel.y * size.x + pixel.x));

@@ -1,4 +1,4 @@
-// What a group of the pool, a column, would bring to a tile, a row: the root of the sum of squares over a few samples of
+// What four groups of the pool, a column, would bring to a tile, a row: for each the root of the sum of squares over a few samples of
 // the tile, without shadows and in no unit. A few samples miss what lies close to others, so the group's distance alone
 // counts as well: without it, VPLs that are near and rarely drawn give bright spots.
 #include "lib/pool/samples.glsl"
@@ -11,21 +11,12 @@ uniform ivec2 grid;  // samples
 uniform vec2 shift;  // of the probes within their quarters of the tile
 uniform float area;  // makes the kernel a number without unit
 
-layout(location = 0) out float score;
+layout(location = 0) out vec4 scores;
 
 const float AROUND = 0.05;  // part of what distance alone would bring
 
-void main() {
-    int group = int(gl_FragCoord.x), tile = int(gl_FragCoord.y);
+float score(int group, Sample probes[4], float extent) {
     vec4 at = texelFetch(groups, ivec2(group, 0), 0), normal = texelFetch(groups, ivec2(group, 1), 0);
-    Sample probes[4];
-    float extent = 0.0;  // of the tile, squared
-    for (int i = 0; i < 4; ++i) {
-        vec2 place = (vec2(tile % TILES, tile / TILES) + 0.5 * (vec2(i & 1, i >> 1) + shift)) / float(TILES);
-        probes[i] = read_sample(positions, sample_normals, min(ivec2(place * vec2(grid)), grid - 1));
-        vec3 apart = probes[i].position - probes[0].position;
-        if (probes[i].depth > 0.0 && probes[0].depth > 0.0) extent = max(extent, dot(apart, apart));
-    }
     float sum = 0.0, around = 0.0;
     for (int i = 0; i < 4; ++i) {
         Sample s = probes[i];
@@ -37,5 +28,18 @@ void main() {
         sum += brings * brings;
         around += near * near;
     }
-    score = at.w * (sqrt(sum) + AROUND * sqrt(around));
+    return at.w * (sqrt(sum) + AROUND * sqrt(around));
+}
+
+void main() {
+    int column = int(gl_FragCoord.x), tile = int(gl_FragCoord.y);
+    Sample probes[4];
+    float extent = 0.0;  // of the tile, squared
+    for (int i = 0; i < 4; ++i) {
+        vec2 place = (vec2(tile % TILES, tile / TILES) + 0.5 * (vec2(i & 1, i >> 1) + shift)) / float(TILES);
+        probes[i] = read_sample(positions, sample_normals, min(ivec2(place * vec2(grid)), grid - 1));
+        vec3 apart = probes[i].position - probes[0].position;
+        if (probes[i].depth > 0.0 && probes[0].depth > 0.0) extent = max(extent, dot(apart, apart));
+    }
+    for (int i = 0; i < 4; ++i) scores[i] = score(4 * column + i, probes, extent);
 }

@@ -15,10 +15,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from pages import ROOT, replace_between
 
-from deferred_ir.frame.facts import TRIANGLES
 from deferred_ir.graph import file
 from deferred_ir.graph.compile import compile
-from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.graph import Step
 from deferred_ir.graph.params import specs
 from deferred_ir.graph.pass_base import Pass
@@ -32,10 +30,10 @@ END = "<!-- end of passes -->"
 def steps() -> dict[str, Step]:
     """Return for each type of pass a step of a built-in graph that uses it."""
     result = {}
-    large = Facts({TRIANGLES: 100_000})  # a scene in which no pass is left out
+    by_rays: Mapping[str, Mapping[str, str]] = {"mapped": {"shadow_rays.visibility": "rays"}}  # uses more passes
     for name in sorted(file.graph_names(), key=lambda name: name != "deferred"):
-        graph = file.load_graph(name)
-        for step in compile(graph, list(graph.outputs), large).steps:
+        graph = file.load_graph(name, by_rays.get(name, {}), {})
+        for step in compile(graph, list(graph.outputs)).steps:
             kind = type(step.work).__module__.rpartition(".")[2]
             result.setdefault(kind, step)
     return result

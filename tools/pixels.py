@@ -29,7 +29,7 @@ from tqdm import tqdm
 ROOT = Path(__file__).resolve().parent.parent
 SIZE = (96, 64)
 VPLS = 32
-GRAPHS = ("forward", "deferred", "hemisphere", "interleaved", "accurate", "resampled", "incremental")
+GRAPHS = ("forward", "deferred", "hemisphere", "interleaved", "mapped", "accurate", "resampled", "incremental")
 SCENES = ("cornell", "atrium", "colors")
 
 BOX = "v -1 -1 -1\nv 1 -1 -1\nv -1 1 -1\nv 1 1 -1\nv -1 -1 1\nv 1 -1 1\nv -1 1 1\nv 1 1 1\n"
@@ -132,9 +132,9 @@ def cases(extra: list[str]) -> Iterator[Case]:
             yield Case(scene, graph, times=times)
             yield Case(scene, graph, times=times, reuse=True)
         for key, value in {"vpl.clamp": 0.0, "shadow_maps.spot_size": 256, "tonemap.operator": "aces"}.items():
-            if graph != "resampled" or not key.startswith("shadow_maps"):  # it has no maps
+            if graph not in ("resampled", "accurate") or not key.startswith("shadow_maps"):  # it has no maps
                 yield Case("soft", graph, {key: value})
-    for graph in ("forward", "deferred", "interleaved", "accurate"):
+    for graph in ("forward", "deferred", "interleaved", "mapped"):
         yield Case("cornell", graph, {"vpl.bounces": 3})
         yield Case("room", graph, {"vpl.candidates": 4, "vpl.pattern": "halton"})
         maps = {"spot_kernel": 5.0, "vpl_kernel": 3.0, "spot_taps": 9, "vpl_taps": 5, "spot_offset": 1.0}
@@ -147,7 +147,7 @@ def cases(extra: list[str]) -> Iterator[Case]:
             yield Case("cornell", graph, {**paraboloid, f"shadow_maps.{key}": value})
         yield Case("colors", graph, {"shadow_maps.vpl_deviation": 2.0, "shadow_maps.projection": "perspective"})
     yield Case("colors", "forward", {"forward.lights_per_draw": 4})
-    for graph in ("interleaved", "accurate"):
+    for graph in ("interleaved", "mapped"):
         yield from (Case("cornell", graph, {"interleave.n": n}) for n in (1, 2, 8))
         yield Case("room", graph, {"gather.angle": 60.0, "gather.fewest": 0.9})
         yield Case("cornell", graph, {"interleave.n": 8}, seeds=(0, 1, 1), reuse=True)
@@ -156,8 +156,8 @@ def cases(extra: list[str]) -> Iterator[Case]:
     yield Case("cornell", "resampled", {"choose_vpls.rays": 1, "filter_samples.steps": 0, "list_vpls.entries": 64})
     yield from denoised_cases() if importlib.util.find_spec("mitsuba_oidn") else ()
     for visibility in ("maps", "rays"):
-        yield Case("soft", "accurate", {"shadow_rays.visibility": visibility}, seeds=(0, 1, 1))
-        yield Case("cornell", "accurate", {"shadow_rays.visibility": visibility, "near_field.samples": 0.5})
+        yield Case("soft", "mapped", {"shadow_rays.visibility": visibility}, seeds=(0, 1, 1))
+        yield Case("cornell", "mapped", {"shadow_rays.visibility": visibility, "near_field.samples": 0.5})
     yield Case("light moves", "incremental", {"vpl.most": 16, "vpl.least": 2}, times=times, seeds=(3,))
     yield from (Case("colors", "deferred", {"tonemap.operator": o}) for o in ("reinhard", "none"))
     yield Case("colors", "deferred", {"tonemap.exposure": 1.5})

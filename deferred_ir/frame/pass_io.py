@@ -60,8 +60,11 @@ class Io:
         images = [name for name, output in step.outputs.items() if output.image]
         self._images = {name: i for i, name in enumerate(images)}
         self.defines |= {f"IMAGE_{name.upper()}": i for name, i in self._images.items()}
-        drawn = [name for name, output in step.outputs.items() if output.attach and _colour(ports[name])]
-        self.defines |= {f"TARGET_{name.upper()}": i for i, name in enumerate(drawn)}
+        target = 0
+        for name, output in step.outputs.items():
+            if output.attach and (targets := _count_targets(ports[name])):
+                self.defines[f"TARGET_{name.upper()}"] = target
+                target += targets
 
     def __getitem__(self, port: str) -> Any:
         if port not in self._ports:
@@ -158,5 +161,8 @@ def single_resources(resource: Resource | None) -> Sequence[GpuTexture | GpuBuff
     return resource if isinstance(resource, list) else [resource] if resource else []
 
 
-def _colour(resource: Resource | None) -> bool:
-    return isinstance(resource, GpuTexture) and not resource.format.depth
+def _count_targets(resource: Resource | None) -> int:
+    """Colour targets that a texture is, each layer of an array one."""
+    if not isinstance(resource, GpuTexture) or resource.format.depth:
+        return 0
+    return max(resource.layers, 1)

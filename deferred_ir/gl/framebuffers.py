@@ -16,25 +16,34 @@ class Target(Protocol):
 
     glo: int
     size: tuple[int, int]
+    layers: int
     format: Format
 
 
 class Framebuffer:
-    """Textures to draw into: colours in the order given, and at most one depth. All layers of arrays are attached."""
+    """Textures to draw into: colours in the order given, and at most one depth.
+
+    Each layer of a colour array is a target of its own; of a depth array all are attached, and vertices choose.
+    """
 
     def __init__(self, gpu: Gpu, textures: Mapping[str, Target], name: str) -> None:
         self.gpu, self._textures, self._name = gpu, textures, name
         self.size = next(iter(textures.values())).size
         self.glo = gpu.gl.make("GenFramebuffers")
-        self.colors = [texture for texture in textures.values() if not texture.format.depth]
+        colors = [texture for texture in textures.values() if not texture.format.depth]
+        self.colors = [(texture, layer) for texture in colors for layer in range(max(texture.layers, 1))]
         self.attach()
 
     def attach(self) -> None:
         """Attach its textures, which may have been allocated anew, and bind it."""
         gl, textures = self.gpu.gl, self._textures
         gl.BindFramebuffer(raw.FRAMEBUFFER, self.glo)
-        for i, color in enumerate(self.colors):
-            gl.FramebufferTexture(raw.FRAMEBUFFER, raw.COLOR_ATTACHMENT0 + i, color.glo, 0)
+        for i, (color, layer) in enumerate(self.colors):
+            target = raw.COLOR_ATTACHMENT0 + i
+            if color.layers:
+                gl.FramebufferTextureLayer(raw.FRAMEBUFFER, target, color.glo, 0, layer)
+            else:
+                gl.FramebufferTexture(raw.FRAMEBUFFER, target, color.glo, 0)
         for texture in textures.values():
             if texture.format.depth:
                 gl.FramebufferTexture(raw.FRAMEBUFFER, raw.DEPTH_ATTACHMENT, texture.glo, 0)
@@ -52,7 +61,7 @@ class Framebuffer:
 
     def clear_color(self, index: int = 0, value: tuple[float, float, float, float] = (0, 0, 0, 0)) -> None:
         """Fill colour target `index`."""
-        if self.colors[index].format.dtype == "u4":
+        if self.colors[index][0].format.dtype == "u4":
             self.gpu.gl.ClearBufferuiv(raw.COLOR, index, (ctypes.c_uint * 4)(*(int(v) for v in value)))
         else:
             self.gpu.gl.ClearBufferfv(raw.COLOR, index, (ctypes.c_float * 4)(*value))

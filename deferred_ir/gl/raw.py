@@ -37,6 +37,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "DrawBuffers": (None, _I, _P),
     "Flush": (None,),
     "FramebufferTexture": (None, _U, _U, _U, _I),
+    "FramebufferTextureLayer": (None, _U, _U, _U, _I, _I),
     "GenFramebuffers": (None, _I, _P),
     "GenQueries": (None, _I, _P),
     "GenTextures": (None, _I, _P),

@@ -86,12 +86,12 @@ class Pass:
         del name, figures, averaged
         return None
 
-    def explain_shared_error(self, facts: Facts) -> str | None:
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
         """Return what the pass gets wrong in all frames alike, so that no mean of frames mends it; None for nothing.
 
-        facts: what is known where the pass runs.
+        facts: what is known where the pass runs. inputs: descriptions, as for `outputs`.
         """
-        del facts
+        del facts, inputs
         return None
 
     def subpasses(self, inputs: Mapping[str, Description | None], state: Any = None) -> Sequence[Mapping[str, Any]]:

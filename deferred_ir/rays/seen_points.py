@@ -18,10 +18,10 @@ SURFACES = 1 << 13
 def find_seen(
     tracer: Tracer, at: Surfaces, places: Array, chosen: Ints, nobody: int, *, threads: int | None = None
 ) -> tuple[Ints, int]:
-    """Return a bit for each point that a surface sees, uint8 (n,), and the number of rays.
+    """Return a bit for each point that a surface sees, uint32 (n,), and the number of rays.
 
     at: n surfaces. places: float32 (m, 3), points in world units, lifted off their surfaces (`Tracer.lift`). chosen:
-    (n, k), k up to 8, which of them each surface asks; `nobody` asks for none. Results do not depend on the number of
+    (n, k), k up to 32, which of them each surface asks; `nobody` asks for none. Results do not depend on the number of
     `threads`.
     """
     tasks = [slice(start, start + SURFACES) for start in range(0, len(chosen), SURFACES)]
@@ -33,13 +33,15 @@ def find_seen(
         targets = places.take(chosen[rows].reshape(-1)[number], axis=0)
         seen = np.zeros(asked.shape, bool)
         seen.reshape(-1)[number] = ~tracer.occluded(origins, targets, lifted=True)
-        bits: Ints = np.packbits(seen, axis=1, bitorder="little")[:, 0]
+        packed = np.packbits(seen, axis=1, bitorder="little")
+        bits: Ints = np.zeros((len(packed), 4), np.uint8)
+        bits[:, : packed.shape[1]] = packed
         return bits, len(number)
 
-    parts: list[Ints] = [np.zeros(0, np.uint8)]
+    parts: list[Ints] = [np.zeros(0, np.uint32)]
     count = 0
     with closing(run_in_order(work, tasks, threads)) as results:
         for bits, rays in results:
-            parts.append(bits)
+            parts.append(bits.view("<u4")[:, 0])
             count += rays
     return np.concatenate(parts), count

@@ -17,6 +17,6 @@ def list_shared_errors(plan: Plan) -> list[str]:
     for step in reversed(plan.steps):
         if step.name in wanted:
             wanted |= {source[0] for source in step.sources.values() if source}
-            if why := step.work.explain_shared_error(plan.facts):
+            if why := step.work.explain_shared_error(plan.facts, step.descriptions):
                 found.append(f"{step.name}: {why}")
     return found[::-1]

@@ -189,6 +189,7 @@ GRAPHS = (
     # The choice of triangles to split depends on their neighbours in memory, so images are not the same to the bit.
     *(replace(case, against="rays", slack=SAME) for case in _repeat("hemisphere", *TWICE)),
     *_repeat("interleaved", *LINEAR, BOX),
+    *_repeat("mapped", *LINEAR, BOX),
     *_repeat("accurate", *LINEAR, BOX),
     *_repeat("resampled", *LINEAR, BOX, "0 VPLs", "1 VPLs", "light grazing a wall", "slivers of 1e-6", *TWICE[:1]),
     *(() if "denoised" in find_obstacles() else DENOISED),

@@ -29,7 +29,7 @@ SETTINGS = {"vpl.fov": 179.9, "vpl.clamp": 0.08, "shadow_maps.projection": "para
 def report(chosen: argparse.Namespace) -> None:
     """Draw the pictures, and print each one's brightness and error."""
     scene, images = load("cornell"), {}
-    for name, graph in (("clamped", "interleaved"), ("residual added back", "accurate")):
+    for name, graph in (("clamped", "interleaved"), ("residual added back", "mapped")):
         with Renderer(SIZE, graph, set=SETTINGS) as renderer:
             images[name] = renderer.render(scene, vpls=VPLS, accumulate=FRAMES).radiance
     images["ray-traced"] = trace_reference(scene, SIZE, spp=SPP).radiance

@@ -1,4 +1,4 @@
-"""Measure what parameters of the graphs `accurate` and `resampled` cost and gain.
+"""Measure what parameters of the graphs `mapped` and `resampled` cost and gain.
 
     python -m deferred_ir.profiling.studies.parameters cornell colors atrium
 
@@ -39,7 +39,7 @@ RESAMPLED: Mapping[str, tuple[str, Sequence[int]]] = {
     "pool": ("vpl.candidates", (4, 16, 64, 256)),
     "entries": ("list_vpls.entries", (128, 256, 512, 1024)),
     "draws": ("choose_vpls.draws", (8, 16, 32, 64, 128)),
-    "rays": ("choose_vpls.rays", (1, 2, 4)),
+    "rays": ("choose_vpls.rays", (1, 2, 4, 8)),
     "steps": ("filter_samples.steps", (0, 1, 2, 3, 4)),
 }
 """The parameter of `resampled` that a table changes, and its values."""
@@ -85,7 +85,7 @@ def measure(scene: Scene, truth: Mapping[str, Any], table: str, chosen: argparse
     with ExitStack() as stack:
         variants = {}
         for name, changed in settings(table, chosen.vpls).items():
-            graph = "resampled" if table in RESAMPLED else "accurate"
+            graph = "resampled" if table in RESAMPLED else "mapped"
             renderer = stack.enter_context(Renderer(chosen.size, graph, set=changed))
             variants[name] = Variant(renderer, renderer.plan(scene, chosen.vpls, ["radiance"]))
             renderer.draw(scene, variants[name].plan, seed=chosen.seeds)  # compiles and allocates: is not measured

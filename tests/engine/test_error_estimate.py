@@ -175,10 +175,10 @@ def test_what_all_frames_get_wrong_is_named(renderer, name):
     shared = " ".join(list_shared_errors(one.plan(room(), 4, ["radiance"])))
     named = {"deferred": "texels", "forward": "texels", "hemisphere": "texels", "denoised": "the denoiser blurs"}
     assert named.get(name, "the filter blurs") in shared
-    pools = ("resampled", "denoised")
+    pools = ("resampled", "accurate", "denoised")
     assert ("2 pixels apart" in shared) == (name in pools)
-    assert ("cones" in shared) == (name not in ("accurate", "hemisphere", *pools))
-    assert ("clamped" in shared) == (name not in ("accurate", *pools))
+    assert ("cones" in shared) == (name not in ("mapped", "hemisphere", *pools))
+    assert ("clamped" in shared) == (name not in ("mapped", *pools))
 
 
 def test_a_filter_is_not_named_where_unfiltered_light_shows_it(renderer):

@@ -38,8 +38,8 @@ GRAPHS = [
     ("deferred", {}),
     ("hemisphere", {}),
     ("interleaved", {}),
-    ("accurate", {"shadow_rays.visibility": "rays"}),
-    ("accurate", {"shadow_rays.visibility": "maps"}),
+    ("mapped", {"shadow_rays.visibility": "rays"}),
+    ("mapped", {"shadow_rays.visibility": "maps"}),
     ("forward", {"forward.lights_per_draw": 3}),
     ("forward", {"forward.lights_per_draw": 1}),
 ]
@@ -87,11 +87,11 @@ def test_the_plan_of_a_frame_says_which_lights_have_no_map(renderer):
     assert out[0]["why"] == "it lights nothing that is seen"
 
 
-@pytest.mark.parametrize("graph", ["deferred", "interleaved", "accurate", "forward", "incremental"])
+@pytest.mark.parametrize("graph", ["deferred", "interleaved", "mapped", "forward", "incremental"])
 def test_without_vpls_nothing_is_cast_shared_or_filtered(renderer, graph):
     one = renderer(SIZE, graph)
     image = one.render(room(), vpls=0)
-    assert one._tracer is None or graph == "accurate"
+    assert one._tracer is None or graph == "mapped"
     plan = one.plan(room(), 0)
     assert not {"light_shares", "gather", "near_field", "neighbours", "light_lonely_pixels"} & {
         step.name for step in plan.steps
@@ -104,7 +104,7 @@ def test_without_vpls_nothing_is_cast_shared_or_filtered(renderer, graph):
     assert set(kept.left_out) <= {"shadow_rays", "light_lonely_pixels", "shadow_maps", "interleave"}
 
 
-@pytest.mark.parametrize("graph", ["deferred", "interleaved", "accurate", "forward"])
+@pytest.mark.parametrize("graph", ["deferred", "interleaved", "mapped", "forward"])
 def test_without_light_there_are_no_maps_and_no_rays(renderer, graph):
     scene = replace(room(), spotlight=replace(room().spotlight, emission=DARK))
     (image, counters, plan), (full, _, kept) = both(renderer, scene, graph, vpls=8)
@@ -177,8 +177,8 @@ def test_the_atlas_has_room_for_the_lights_that_live(renderer, monkeypatch):
 
 
 def test_transient_targets_share_textures_and_the_pixels_are_the_same(renderer):
-    for graph in ("interleaved", "accurate"):
-        settings = {"shadow_rays.visibility": "rays"} if graph == "accurate" else {}
+    for graph in ("interleaved", "mapped"):
+        settings = {"shadow_rays.visibility": "rays"} if graph == "mapped" else {}
         one, full = (renderer(SIZE, graph, set=settings, keep_all=keep_all) for keep_all in (False, True))
         images = [r.render(room(), vpls=16, seed=seed) for r in (one, full) for seed in (0, 1)]
         assert same_pixels(images[0], images[2])

@@ -19,7 +19,7 @@ from deferred_ir.gl.textures import GpuTexture
 
 SIZE = (32, 24)
 ROOM = room()
-GRAPHS = ["forward", "deferred", "hemisphere", "interleaved", "accurate", "incremental"]
+GRAPHS = ["forward", "deferred", "hemisphere", "interleaved", "mapped", "incremental"]
 SETTINGS = {"vpl.count": 16, "shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 16}
 RAYS = {"shadow_rays.visibility": "rays"}
 
@@ -198,10 +198,11 @@ def test_a_define_compiles_the_programs_that_name_it(renderer, graph):
 
 
 def test_a_parameter_that_no_program_names_compiles_nothing(renderer):
-    one = warmed_up(renderer(SIZE, "accurate", set=SETTINGS, reuse=True))
+    settings = {**SETTINGS, **RAYS}
+    one = warmed_up(renderer(SIZE, "mapped", set=settings, reuse=True))
     compiled = one.executor.library.compiled
     for change in ({"vpl.bounces": 2}, {"vpl.clamp": 0.1}, {"shadow_maps.bend": 1.0}, {"near_field.samples": 2.0}):
-        one.configure(set={**SETTINGS, **change})
+        one.configure(set={**settings, **change})
         assert drawn(one, ROOM)
         assert one.executor.library.compiled == compiled
 
@@ -221,7 +222,7 @@ def changes():
     yield ROOM, {}, SETTINGS
 
 
-@pytest.mark.parametrize("graph", [*GRAPHS[:-1], "accurate by rays"])
+@pytest.mark.parametrize("graph", [*GRAPHS[:-1], "mapped by rays"])
 def test_no_pixel_tells(renderer, graph):
     name, *rays = graph.split(" by ")
     own = RAYS if rays else {}
@@ -301,7 +302,7 @@ class WatchedScene:
         return getattr(self.watched.frame.scene, name)
 
 
-@pytest.mark.parametrize("graph", [*GRAPHS, "accurate by rays"])
+@pytest.mark.parametrize("graph", [*GRAPHS, "mapped by rays"])
 def test_passes_name_all_that_they_read(renderer, graph):
     name, *rays = graph.split(" by ")
     one = renderer(SIZE, name, set={**SETTINGS, **(RAYS if rays else {})}, reuse=True)

@@ -32,8 +32,8 @@ def read_records(one):
 
 @pytest.mark.parametrize(
     ("scene", "rays"),
-    [(room(), 1), (smooth_scene(), 4), (two_rooms(), 4)],
-    ids=["room, one ray", "smooth", "two rooms"],
+    [(room(), 1), (smooth_scene(), 4), (two_rooms(), 4), (room(), 8)],
+    ids=["room, one ray", "smooth", "two rooms", "room, eight rays"],
 )
 def test_the_mean_is_that_of_all_vpls_of_the_pool(renderer, tmp_path, scene, rays):
     """Each image against the sum over its own pool, which takes most of the noise away; the near field is left out."""
@@ -96,7 +96,7 @@ def test_it_shows_what_accurate_shows(renderer):
     """Two ways to one image, averaged over seeds; without filter and at every pixel."""
     scene, size = room(), (32, 24)
     one = renderer(size, "resampled", set=RAW)
-    other = renderer(size, "accurate", set={"interleave.n": 1, "vpl.candidates": 1, "shadow_rays.visibility": "rays"})
+    other = renderer(size, "mapped", set={"interleave.n": 1, "vpl.candidates": 1, "shadow_rays.visibility": "rays"})
     means = [
         np.mean([made.render(scene, vpls=64, seed=seed).radiance for seed in range(16)], axis=0)
         for made in (one, other)
@@ -107,7 +107,7 @@ def test_it_shows_what_accurate_shows(renderer):
 
 @pytest.mark.parametrize("scene", [room(), smooth_scene()], ids=["room", "smooth"])
 def test_direct_light_is_that_of_rays(renderer, scene):
-    one, other = renderer((64, 48), "resampled"), renderer((64, 48), "accurate", set={"shadow_rays.visibility": "rays"})
+    one, other = renderer((64, 48), "resampled"), renderer((64, 48), "mapped", set={"shadow_rays.visibility": "rays"})
     assert_same_but_for_edges(*(made.render(scene, vpls=0).radiance for made in (one, other)))
     soft = replace(scene, spotlight=replace(scene.spotlight, radius=0.1))
     means = [np.mean([made.render(soft, vpls=0, seed=s).radiance for s in range(8)], axis=0) for made in (one, other)]
@@ -201,7 +201,7 @@ def test_filter_keeps_constant_light(renderer):
 def test_the_filter_takes_most_of_the_noise_and_none_of_the_light(renderer):
     scene, size = room(), (96, 72)
     raw, filtered = (renderer(size, "resampled", set={**RAW, "filter_samples.steps": steps}) for steps in (0, 3))
-    truth = renderer(size, "accurate", set={"interleave.n": 1}).render(scene, vpls=256, seed=5).radiance
+    truth = renderer(size, "mapped", set={"interleave.n": 1}).render(scene, vpls=256, seed=5).radiance
     everywhere = np.ones(size[::-1], bool)
     errors = [
         np.mean([rel_mse(made.render(scene, vpls=64, seed=seed).radiance, truth, everywhere) for seed in range(4)])

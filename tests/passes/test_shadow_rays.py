@@ -9,7 +9,7 @@ import pytest
 from distance import rel_mse, share_off
 from small_scenes import crooked_room, room, smooth_scene
 
-from deferred_ir.frame.facts import EMITS, SOFTWARE, TRIANGLES
+from deferred_ir.frame.facts import EMITS
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.file import load_graph
@@ -25,7 +25,7 @@ RAYS = {"shadow_rays.visibility": "rays", "vpl.clamp": 0.02, "vpl.candidates": 1
 
 def drawn(renderer, scene, vpls, **settings):
     """A Renderer that has drawn one frame of `accurate` by rays, and its plan."""
-    one = renderer(SIZE, "accurate", set=RAYS | settings, keep_all=True)
+    one = renderer(SIZE, "mapped", set=RAYS | settings, keep_all=True)
     plan = one.plan(scene, vpls)
     one.draw(scene, plan)
     return one, plan
@@ -93,7 +93,7 @@ def test_lonely_pixels_ask_the_missing_vpls(renderer):
 def test_rays_and_maps_make_the_same_picture(renderer):
     scene = crooked_room()
     by_rays, plan = drawn(renderer, scene, 64)
-    by_maps = renderer(SIZE, "accurate", set=RAYS | {"shadow_rays.visibility": "maps"})
+    by_maps = renderer(SIZE, "mapped", set=RAYS | {"shadow_rays.visibility": "maps"})
     rays, maps = by_rays.read(plan).radiance, by_maps.render(scene, vpls=64).radiance
     assert rays.mean() == pytest.approx(maps.mean(), rel=0.01)
     assert np.abs(rays - maps).mean() < 0.03 * maps.mean()
@@ -103,9 +103,9 @@ def test_with_rays_no_light_has_a_map(renderer):
     one, plan = drawn(renderer, room(), 64)
     assert plan.left_out["shadow_maps"] == "not needed: shadow_rays replaces it"
     assert one.executor.counters["maps_drawn"] == 0
-    maps = renderer(SIZE, "accurate", set={"shadow_rays.visibility": "maps"}).plan(room(), 64)
+    maps = renderer(SIZE, "mapped", set={"shadow_rays.visibility": "maps"}).plan(room(), 64)
     assert "shadow_maps" in {step.name for step in maps.steps}
-    dealt_to_all = renderer(SIZE, "accurate", set=RAYS | {"interleave.n": 1}).plan(room(), 64)
+    dealt_to_all = renderer(SIZE, "mapped", set=RAYS | {"interleave.n": 1}).plan(room(), 64)
     assert "shadow_maps" in {step.name for step in dealt_to_all.steps}  # there are no shares to ask about
 
 
@@ -113,7 +113,7 @@ def test_with_rays_no_light_has_a_map(renderer):
 @pytest.mark.parametrize("scene", [crooked_room(), smooth_scene()])
 def test_the_spotlight_is_right_pixel_by_pixel(renderer, scene, radius):
     scene = replace(scene, spotlight=replace(scene.spotlight, radius=radius))
-    one = renderer(SIZE, "accurate", set=RAYS | {"shadow_rays.disc_samples": 64})
+    one = renderer(SIZE, "mapped", set=RAYS | {"shadow_rays.disc_samples": 64})
     found = one.render(scene, vpls=0, accumulate=4 if radius else 1).radiance
     truth = PathTracer(scene, one.tracer()).estimate_direct(SIZE, 256)
     lit = truth.mean(axis=2) > 0
@@ -129,15 +129,11 @@ def test_few_vpls_are_no_trouble(renderer, vpls):
 
 
 def left_out(visibility, facts):
-    plan = compile(load_graph("accurate", {"shadow_rays.visibility": visibility}, {}), ["radiance"], Facts(facts))
+    plan = compile(load_graph("mapped", {"shadow_rays.visibility": visibility}, {}), ["radiance"], Facts(facts))
     return plan.left_out.get("shadow_rays")
 
 
-def test_auto_takes_what_should_cost_less_and_says_so():
-    few, many = {TRIANGLES: 10}, {TRIANGLES: 100_000}
-    assert left_out("auto", many) is None
-    assert left_out("auto", few).startswith("maps should take less time: 0.15 ms for each VPL, rays ")
-    assert "less time" in left_out("auto", {**many, SOFTWARE: False})  # a GPU draws maps in no time
-    assert left_out("rays", few) is None
-    assert left_out("maps", many) == "visibility is 'maps'"
+def test_where_it_is_left_out_it_says_why():
+    assert left_out("rays", {}) is None
+    assert left_out("maps", {}) == "visibility is 'maps'"
     assert left_out("rays", {EMITS: False}) == "the spotlight emits nothing"

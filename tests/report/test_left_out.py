@@ -83,7 +83,7 @@ def test_frames_of_a_mean_are_counted_without_what_shows_it(renderer):
 
 
 def test_what_is_a_choice_is_not_measured(renderer):
-    found, _ = told(renderer, room(), "accurate", **{"vpl.count": 4, "shadow_rays.visibility": "maps"})
+    found, _ = told(renderer, room(), "mapped", **{"vpl.count": 4, "shadow_rays.visibility": "maps"})
     assert found["shadow_rays"].ms is None
     assert found["shadow_rays"].bytes is None
 

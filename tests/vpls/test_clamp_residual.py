@@ -339,7 +339,7 @@ def test_where_nothing_is_clamped_it_is_left_out_and_says_why(setting, renderer,
 def test_the_graph_accurate_is_one_bounce_of_light(renderer, n, off):
     """The tolerance is larger with interleaving: in so small an image, many filter windows are cut by edges."""
     scene, size = room(), (96, 64)
-    one = renderer(size, "accurate", set={"vpl.clamp": 0.1, "interleave.n": n})
+    one = renderer(size, "mapped", set={"vpl.clamp": 0.1, "interleave.n": n})
     image = one.render(scene, vpls=512).radiance
     truth = PathTracer(scene, one.tracer()).estimate(size, 128, seed=3)
     indirect = (image - truth.direct)[truth.hit].mean() / truth.indirect[truth.hit].mean()
@@ -351,7 +351,7 @@ def test_the_graph_accurate_is_one_bounce_of_light(renderer, n, off):
 
 def test_the_graph_accurate_clamps_the_more_the_fewer_vpls_there_are(renderer):
     scene, distances = room(), []
-    one = renderer(SIZE, "accurate")
+    one = renderer(SIZE, "mapped")
     for vpls in (16, 64):
         one.draw(scene, one.plan(scene, vpls))
         records = one.executor.resource(("vpl", "vpls")).records

@@ -39,6 +39,21 @@ RUNGS: tuple[Settings, ...] = (
     {"choose_vpls.draws": 64, "filter_samples.steps": 4},
     {"sample_pixels.scale": 1, "choose_vpls.rays": 2},
     {"sample_pixels.scale": 1},
+    {
+        "sample_pixels.scale": 1,
+        "list_vpls.entries": 1024,
+        "choose_vpls.draws": 64,
+        "choose_vpls.rays": 8,
+        "near_field.samples": 2.0,
+    },
+    {
+        "sample_pixels.scale": 1,
+        "vpl.candidates": 256,
+        "list_vpls.entries": 2048,
+        "choose_vpls.draws": 128,
+        "choose_vpls.rays": 16,
+        "near_field.samples": 4.0,
+    },
 )
 """Parameters that differ from the graph's own, the coarsest first. The last is the one to average."""
 VPLS = (4, 8, 16, 32, 64, 128, 256, 512, 1024)

@@ -19,6 +19,7 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.graph.stages import Stage, stage_param
 from deferred_ir.pool.samples import draw_samples, read_layout
 
 
@@ -34,6 +35,7 @@ class Params:
     )
     angle: float = param(15.0, lo=0.0, hi=180.0, doc="Samples count whose normals differ by less, degrees.")
     slack: float = param(0.3, lo=0.0, hi=16.0, doc="And that lie no farther off the plane, in steps between samples.")
+    stage: Stage = stage_param()
 
 
 class FilterSamples(Pass):
@@ -57,9 +59,10 @@ class FilterSamples(Pass):
                 "irradiance; alpha: standard deviation of its luminance",
                 Texture("rgba32f"),
                 attach=False,
+                image=True,
                 transient=True,
             ),
-            "scratch": Output("the same, a step before", Texture("rgba32f"), attach=False, transient=True),
+            "scratch": Output("the same, a step before", Texture("rgba32f"), attach=False, image=True, transient=True),
         }
 
     def depends(self) -> frozenset[str]:
@@ -76,15 +79,15 @@ class FilterSamples(Pass):
         return "the filter blurs light inside surfaces" if self.params.steps else None
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Draw step by step."""
-        steps, unit = self.params.steps, int(io.defines["UNIT_IRRADIANCE"])
+        """Filter step by step."""
+        steps, unit, image = self.params.steps, int(io.defines["UNIT_IRRADIANCE"]), int(io.defines["IMAGE_FILTERED"])
         draws = max(steps, 1)  # without steps the samples are copied
         layout = read_layout(io)
         targets = [io["filtered"], io["scratch"]]
         for step in range(draws):
             target = targets[(draws - 1 - step) % 2]
             defines = {"FIRST": int(step == 0), "SMOOTH": int(frame.smooth)}
-            program = io.program("filter_samples.frag", defines=defines)
+            program = io.stage_program("filter_samples/filter", defines)
             program.set(
                 grid=layout.grid,
                 apart=1 << step if steps else 0,
@@ -92,7 +95,11 @@ class FilterSamples(Pass):
                 cosine=cos(radians(self.params.angle)),
                 slack=self.params.slack * layout.scale,
             )
-            target.framebuffer.bind()
+            if program.computes:
+                io.gpu.barrier()  # after the step before
+                target.bind_image(image)
+            else:
+                target.framebuffer.bind()
             draw_samples(io, program, layout)
             target.touch()
             target.bind(unit, io.gpu.sampler(False))

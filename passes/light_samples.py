@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import ClassVar
 
 from deferred_ir.frame.frame import Frame
@@ -11,12 +12,21 @@ from deferred_ir.frame.vpl_params import explain_no_vpls
 from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.graph.stages import Stage, stage_param
 from deferred_ir.pool.samples import draw_samples, read_layout
+
+
+@dataclass(frozen=True)
+class Params:
+    """How it runs."""
+
+    stage: Stage = stage_param()
 
 
 class LightSamples(Pass):
     """Irradiance of samples, not filtered: right in the mean over seeds."""
 
+    Params = Params
     inputs: ClassVar[Mapping[str, Input]] = {
         "layout": Input("where samples stand", format="layout"),
         "vpls": Input("the pool: its cone", format="vpl"),
@@ -34,7 +44,9 @@ class LightSamples(Pass):
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return one texture of the frame's size."""
         del inputs
-        return {"irradiance": Output("irradiance from the VPLs at samples", Texture("rgba32f"), transient=True)}
+        return {
+            "irradiance": Output("irradiance from the VPLs at samples", Texture("rgba32f"), image=True, transient=True)
+        }
 
     def depends(self) -> frozenset[str]:
         """Nothing of the frame."""
@@ -45,8 +57,8 @@ class LightSamples(Pass):
         return explain_no_vpls(facts)
 
     def execute(self, frame: Frame, io: Io) -> None:
-        """Draw the samples."""
-        program = io.program("light_samples.frag", defines={"SMOOTH": int(frame.smooth)})
+        """Add up for all samples."""
+        program = io.stage_program("light_samples/light", {"SMOOTH": int(frame.smooth)})
         draw_samples(io, program, read_layout(io))
 
 

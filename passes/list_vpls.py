@@ -13,6 +13,7 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.graph.stages import Stage, stage_param
 from deferred_ir.pool.effort import accept_effort, read_effort
 from deferred_ir.pool.proposals import TILES, count_groups
 
@@ -22,6 +23,7 @@ class Params:
     """Parameters of the lists."""
 
     entries: int = param(512, lo=16, hi=4096, doc="VPLs in the list of a tile.", formerly="propose_vpls.entries")
+    stage: Stage = stage_param()
 
 
 class ListVpls(Pass):
@@ -40,12 +42,12 @@ class ListVpls(Pass):
         entries = self.params.entries * read_effort(inputs)
         size, defines = (entries, TILES**2), {"LIST_ENTRIES": entries, "TILES": TILES}
         return {
-            "numbers": Output("numbers of the VPLs in the pool", Texture("r32ui", size)),
+            "numbers": Output("numbers of the VPLs in the pool", Texture("r32ui", size), image=True),
             "list_positions": Output(
-                "position, luminous power over the pool's times weight", Texture("rgba32f", size), defines
+                "position, luminous power over the pool's times weight", Texture("rgba32f", size), defines, image=True
             ),
-            "list_normals": Output("normal, clamp^2", Texture("rgba32f", size)),
-            "list_emissions": Output("emission times weight", Texture("rgba32f", size)),
+            "list_normals": Output("normal, clamp^2", Texture("rgba32f", size), image=True),
+            "list_emissions": Output("emission times weight", Texture("rgba32f", size), image=True),
         }
 
     def depends(self) -> frozenset[str]:
@@ -59,9 +61,9 @@ class ListVpls(Pass):
     def execute(self, frame: Frame, io: Io) -> None:
         """Draw all lists."""
         count = len(io["vpls"].records)
-        program = io.program("list_vpls.frag")
+        program = io.stage_program("list_vpls/list")
         program.set(vpls=count, groups=count_groups(count), frame_seed=frame.seed & 0x7FFFFFFF)
-        program.draw_fullscreen()
+        io.cover(program, [(0, 0, *io["numbers"].size)])
 
 
 PASS = ListVpls

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Container
+from collections.abc import Callable, Collection, Container, Mapping
 from typing import Any
 
 from deferred_ir.engine.allocation import Allocation
@@ -23,11 +23,12 @@ FRAME_BLOCK = 0
 class Executor:
     """Owns what plans need on the GPU, and runs them.
 
+    find_computed: returns the modules of the passes that run in compute shaders unless they are told otherwise.
     counters: what the passes published in the last frame. skipped: names of the passes that did not run in it.
     """
 
-    def __init__(self, gpu: Gpu) -> None:
-        self.gpu = gpu
+    def __init__(self, gpu: Gpu, find_computed: Callable[[], Collection[str]] = frozenset) -> None:
+        self.gpu, self._find_computed = gpu, find_computed
         self.library = ShaderLibrary(gpu)
         self.allocation = Allocation(gpu, self.library)
         self.counters: Counter[str] = Counter()
@@ -63,7 +64,7 @@ class Executor:
         """Run one pass."""
         self._runs.forget(step)
         self.gpu.reset()
-        io.begin()
+        io.begin(self._find_computed)
         if timers:
             timers.mark(step.name)
         step.work.execute(frame, io)
@@ -86,6 +87,10 @@ class Executor:
     def state(self, name: str) -> Any:
         """Return the state (`Pass.State`) of the pass `name`; None if it has none, or is not in the plan."""
         return self.allocation.state(name)
+
+    def stages(self) -> Mapping[str, str]:
+        """Return "fragment" or "compute" for each pass of the last frame's plan that can run in both and has run."""
+        return {io.step.name: io.stage for io in self.allocation.ios if io.stage}
 
     def forget(self) -> None:
         """Drop the states of all passes; the next frame runs each of them afresh."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from deferred_ir.base.errors import DeviceError, ShaderError
@@ -14,10 +14,12 @@ from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.graph import Step
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Output
+from deferred_ir.graph.stages import SUFFIXES, find_stage
 
 NO_DEFINES: Mapping[str, int | float] = {}
 Resource = GpuTexture | GpuBuffer | list[GpuTexture]
 Meta = TypeVar("Meta")
+Rectangle = tuple[int, int, int, int]
 SCENE_SAMPLERS = {"albedo_texture"}
 """Samplers that SceneBuffers binds; all others must be ports."""
 
@@ -26,7 +28,8 @@ class Io:
     """A pass's ports while it executes: `io["depth"]` is a resource, `io.program(...)` knows the ports' defines.
 
     written: each (pass, port) of the plan as its writer declares it. state: the pass's `State`, which it changes as it
-    likes and finds again in the next frame. A run publishes counters of its work, figures of what its outputs hold, and
+    likes and finds again in the next frame. stage: "fragment" or "compute" for a pass that can run in both, else None;
+    its images are bound in the latter. A run publishes counters of its work, figures of what its outputs hold, and
     `again`: whether the next frame must run the pass even if nothing changes that its outputs follow from.
     """
 
@@ -42,6 +45,7 @@ class Io:
         self.counters: Counter[str] = Counter()
         self.figures: Counter[str] = Counter()
         self.again = False
+        self.stage: str | None = None
         self.gpu = library.gpu
         self._framebuffer: Framebuffer | None = None
         self._programs: dict[Any, Program] = {}
@@ -89,8 +93,12 @@ class Io:
         """Set the pass's render target."""
         self._framebuffer = framebuffer
 
-    def begin(self) -> None:
-        """Prepare a run: bind the framebuffer, all sampled inputs and images, and publish nothing yet."""
+    def begin(self, find_computed: Callable[[], Collection[str]] = frozenset) -> None:
+        """Prepare a run: bind the framebuffer, all sampled inputs and images, and publish nothing yet.
+
+        find_computed: see `find_stage`.
+        """
+        self.stage = find_stage(self.step.work, find_computed)
         self.counters.clear()
         self.figures.clear()
         self.again = False
@@ -99,13 +107,19 @@ class Io:
         for name, unit in self._units.items():
             port = self.step.work.inputs[name]
             self[name].bind(unit, self.gpu.sampler(port.linear, port.compare))
-        for name, unit in self._images.items():
-            self[name].bind_image(unit)
+        if self._stores:
+            for name, unit in self._images.items():
+                self[name].bind_image(unit)
 
     def end(self) -> None:
         """Finish a run: let others see what shaders stored into images."""
-        if self._images:
+        if self._stores:
             self.gpu.barrier()
+
+    @property
+    def _stores(self) -> bool:
+        """Whether shaders of this run store into images."""
+        return bool(self._images) and self.stage != "fragment"
 
     def program(self, *files: str, defines: Mapping[str, int | float] = NO_DEFINES) -> Program:
         """Return the program of these shader files, one a stage; they know the defines of the ports and `defines`."""
@@ -118,6 +132,21 @@ class Io:
                 raise ShaderError(f"{program.name}: sampler '{min(unknown)}' is no input of pass {self.step.name}")
             self._programs[key] = program
         return self._programs[key]
+
+    def stage_program(self, file: str, defines: Mapping[str, int | float] = NO_DEFINES) -> Program:
+        """Return the program of a shader file, named without its suffix, in the stage that this run is in."""
+        assert self.stage, f"{self.step.name} has no parameter 'stage'"
+        return self.program(file + SUFFIXES[self.stage], defines=defines)
+
+    def cover(self, program: Program, rectangles: Iterable[Rectangle]) -> None:
+        """Run a program for each texel of rectangles x, y, width, height: draw into the bound target, or dispatch."""
+        for rectangle in rectangles:
+            if program.computes:
+                program.dispatch(rectangle)
+            else:
+                self.gpu.scissor(rectangle)
+                program.draw_fullscreen()
+        self.gpu.scissor(None)
 
     def fit(self, port: str, layers: int) -> None:
         """Give the texture `port`, one that grows and is drawn into, room for `layers` layers.

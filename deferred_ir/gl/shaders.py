@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,15 +17,19 @@ from deferred_ir.gl import raw
 from deferred_ir.gl.context import Gpu
 
 VERSION = "#version 430 core"
+COMPUTE = "compute_shader"
 STAGES = {
     ".vert": "vertex_shader",
     ".tesc": "tess_control_shader",
     ".tese": "tess_evaluation_shader",
     ".geom": "geometry_shader",
     ".frag": "fragment_shader",
+    ".comp": COMPUTE,
 }
 """moderngl's name of a file's stage, by its suffix."""
 FULLSCREEN = "fullscreen.vert"
+WORK_GROUP = 8
+"""Edge of the squares of texels that are the work groups of compute shaders (shaders/lib/compute.glsl)."""
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _SUFFIXES = {*STAGES, ".glsl"}
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
@@ -84,14 +88,18 @@ def flatten(name: str, folders: Iterable[Path], defines: Mapping[str, int | floa
 
 
 class Program:
-    """A linked program. name: of its first file. arrays: the vertex arrays made for it, by what they draw."""
+    """A linked program. name: of its first file. arrays: the vertex arrays made for it, by what they draw.
 
-    def __init__(self, gpu: Gpu, name: str, glsl: Any, sources: Collection[Source]) -> None:
+    computes: whether it is a compute shader, which is dispatched instead of drawn.
+    """
+
+    def __init__(self, gpu: Gpu, name: str, glsl: Any, sources: Mapping[str, Source]) -> None:
         self.gpu, self.name, self.glsl = gpu, name, glsl
         self.arrays: dict[Any, Any] = {}
         members = {member: glsl[member] for member in glsl}
-        self.text = "".join(source.text for source in sources)
-        self._words = frozenset().union(*(source.words for source in sources))
+        self.computes = COMPUTE in sources
+        self.text = "".join(source.text for source in sources.values())
+        self._words = _words(sources)
         self._uniforms = {key: m for key, m in members.items() if type(m).__name__ == "Uniform"}
         self.attributes = [
             key for key, m in members.items() if type(m).__name__ == "Attribute" and not key.startswith("gl_")
@@ -117,6 +125,14 @@ class Program:
             self.arrays[None] = self.gpu.ctx.vertex_array(self.glsl, [])
         self.arrays[None].render(self.gpu.ctx.TRIANGLES, vertices=3)
 
+    def dispatch(self, rectangle: tuple[int, int, int, int]) -> None:
+        """Run a compute shader for each texel of a rectangle x, y, width, height (shaders/lib/compute.glsl).
+
+        Whoever reads what it stores puts a barrier before (`Gpu.barrier`).
+        """
+        self.set(rectangle=rectangle)
+        self.glsl.run(-(-rectangle[2] // WORK_GROUP), -(-rectangle[3] // WORK_GROUP))
+
     def release(self) -> None:
         """Delete the program and its vertex arrays."""
         for array in self.arrays.values():
@@ -137,11 +153,11 @@ class ShaderLibrary:
     def program(
         self, *files: str, defines: Mapping[str, int | float] | None = None, folder: Path | None = None
     ) -> Program:
-        """Return the program of these files, one a stage; without a .vert it covers the whole target.
+        """Return the program of these files, one a stage: a .comp alone; without a .vert it covers the whole target.
 
         `defines` make a difference where a file names them. `folder` is searched before the package's shaders.
         """
-        asked = {**self.gpu.defines, **(defines or {})}
+        asked = {"WORK_GROUP": WORK_GROUP, **self.gpu.defines, **(defines or {})}
         words = self._words.get((files, folder))
         key = None if words is None else _key(files, folder, asked, words)
         if key is None or key not in self._programs:
@@ -158,10 +174,10 @@ class ShaderLibrary:
         texts: dict[str, Any] = {stage: source.text for stage, source in sources.items()}
         self.compiled += 1
         try:
-            glsl = self.gpu.ctx.program(**texts)
+            glsl = self.gpu.ctx.compute_shader(texts[COMPUTE]) if COMPUTE in texts else self.gpu.ctx.program(**texts)
         except moderngl.Error as error:
             raise ShaderError(_locate(str(error), sources, name)) from error
-        return Program(self.gpu, name, glsl, sources.values())
+        return Program(self.gpu, name, glsl, sources)
 
     def reload(self) -> bool:
         """Build the programs again whose files have changed, all or none. Returns whether there were any.
@@ -209,7 +225,9 @@ class ShaderLibrary:
 def _sources(files: Iterable[str], defines: Mapping[str, Any], folder: Path | None) -> dict[str, Source]:
     """Read the flattened shader of each stage."""
     folders = [package_shaders()] if folder is None else [folder, package_shaders()]
-    stages = {"vertex_shader": FULLSCREEN, **{STAGES[Path(file).suffix]: file for file in files}}
+    stages = {STAGES[Path(file).suffix]: file for file in files}
+    if COMPUTE not in stages:
+        stages = {"vertex_shader": FULLSCREEN, **stages}
     return {stage: flatten(file, folders, defines) for stage, file in stages.items()}
 
 

@@ -15,7 +15,7 @@ from deferred_ir.base.errors import GraphError, did_you_mean
 from deferred_ir.graph.facts import NOTHING_KNOWN, Fact, Facts
 from deferred_ir.graph.graph import Graph, Plan, Step
 from deferred_ir.graph.pass_base import Pass
-from deferred_ir.graph.ports import Description
+from deferred_ir.graph.ports import Description, is_storable
 
 
 def compile(
@@ -192,6 +192,11 @@ def _describe(
                 faults.extend(
                     f"{name}: depends(): no part of a frame is '{x}'{did_you_mean(x, parts)}" for x in unknown
                 )
+            faults.extend(
+                f"{name}.{port}: shaders store into no {o.description}; declare one colour texture, such as rgba32f"
+                for port, o in step.outputs.items()
+                if o.image and not is_storable(o.description)
+            )
             both = sorted(step.outputs.keys() & work.inputs.keys())
             faults.extend(f"{name}.{port}: is an input and an output; rename one of them" for port in both)
     for name, text in graph.outputs.items():

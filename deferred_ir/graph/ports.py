@@ -55,6 +55,11 @@ class Buffer:
 Description = Texture | Buffer
 
 
+def is_storable(description: Description) -> bool:
+    """Return whether shaders can store into it as an image."""
+    return isinstance(description, Texture) and not description.copies and not description.format.startswith("depth")
+
+
 @dataclass(frozen=True)
 class Input:
     """A port that reads. `format` None takes any. Filter and comparison belong to the reader, not to the texture.

@@ -3,8 +3,8 @@
 A tile's list is drawn from the pool with probabilities that are in part those of the VPLs' power and in part in
 proportion to what each would bring to a few pixels of the tile unshadowed. Neighbours on a Hilbert curve through the
 VPLs' positions and normals form groups, and only one of each group is scored; within a group VPLs are drawn by power.
-A shader draws the lists (shaders/list_vpls.frag). The sum over a list of what its VPLs bring, each times its weight, is
-right in the mean for every pixel of the image, whatever the scores are, since EVEN is above 0.
+A shader draws the lists (shaders/list_vpls/list.glsl). The sum over a list of what its VPLs bring, each times its
+weight, is right in the mean for every pixel of the image, whatever the scores are, since EVEN is above 0.
 """
 
 from __future__ import annotations

@@ -34,8 +34,5 @@ def read_layout(io: Io) -> Layout:
 
 
 def draw_samples(io: Io, program: Program, layout: Layout) -> None:
-    """Draw the parts of the bound target that hold samples."""
-    for rectangle in layout.list_rectangles():
-        io.gpu.scissor(rectangle)
-        program.draw_fullscreen()
-    io.gpu.scissor(None)
+    """Run a program for each sample: draw the parts of the bound target that hold samples, or dispatch for them."""
+    io.cover(program, layout.list_rectangles())

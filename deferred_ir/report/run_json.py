@@ -38,10 +38,13 @@ def describe_run(
     accumulated: frames averaged in an image. `add_measurements` adds what takes work of its own.
     """
     passes: list[dict[str, Any]] = [dict(entry) for entry in measurement.passes()]
+    stages = renderer.executor.stages()
     for entry in passes:
         step = next((step for step in plan.steps if step.name == entry["name"]), None)
         if step and (subpasses := step.work.subpasses(step.descriptions, renderer.executor.state(step.name))):
             entry["subpasses"] = [dict(subpass) for subpass in subpasses]
+        if stage := stages.get(str(entry["name"])):
+            entry["stage"] = stage
     left_out = [*list_for_scene(scene), *list_for_frames(renderer, plan, measurement)]
     return {
         "scene": scene.name,

@@ -218,6 +218,31 @@ def test_an_image_that_shaders_store_into_is_bound_and_seen_by_readers(draw, tmp
     np.testing.assert_array_equal(images["own"], images["radiance"][:, ::-1])
 
 
+def test_a_pass_of_compute_shaders_alone(draw, tmp_path):
+    class Mirror(Pass):
+        shader_folder = tmp_path
+        inputs = {"image": Input("image", format="rgba32f")}  # noqa: RUF012
+
+        def outputs(self, inputs):
+            return {"out": Output("mirrored", Texture("rgba32f"), attach=False, image=True)}
+
+        def execute(self, frame, io):
+            io.cover(io.program("mirror.comp"), [(0, 0, *frame.size)])
+
+    (tmp_path / "mirror.comp").write_text("""
+        #include "lib/compute.glsl"
+        layout(binding = UNIT_IMAGE) uniform sampler2D image;
+        layout(binding = IMAGE_OUT, rgba32f) uniform writeonly image2D stored;
+        void main() {
+            ivec2 pixel = find_texel();
+            if (!is_inside(pixel)) return;
+            imageStore(stored, ivec2(imageSize(stored).x - 1 - pixel.x, pixel.y), texelFetch(image, pixel, 0));
+        }
+    """)
+    _, images = draw(kind=Mirror)
+    np.testing.assert_array_equal(images["own"], images["radiance"][:, ::-1])
+
+
 @dataclass
 class Count:
     """How many frames a pass has run in."""

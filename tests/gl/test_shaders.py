@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from deferred_ir.base.errors import ShaderError
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.shaders import Program, ShaderLibrary, Source, _locate, flatten, package_shaders
+from deferred_ir.gl.textures import GpuTexture
+from deferred_ir.graph.ports import Texture
 
 VERTEX = "void main() { gl_Position = vec4(0.0); }\n"
 
@@ -42,6 +45,39 @@ def fault(library: ShaderLibrary, folder: Path, text: str) -> str:
         program(library, folder, text)
     assert "\n" not in str(raised.value)
     return str(raised.value)
+
+
+def test_a_compute_shader_runs_for_each_texel_of_a_rectangle(gpu, library, folder):
+    write(
+        folder,
+        "mark.comp",
+        """
+        #include "lib/compute.glsl"
+        layout(binding = 0, rgba32f) uniform image2D image;
+        void main() {
+            ivec2 at = find_texel();
+            if (is_inside(at)) imageStore(image, at, imageLoad(image, at) + vec4(at, STEP, 1.0));
+        }
+        """,
+    )
+    program = library.program("mark.comp", defines={"STEP": 2}, folder=folder)
+    texture = GpuTexture(gpu, Texture("rgba32f"), (21, 13))
+    texture.fill(0)
+    texture.bind_image(0)
+    expected = np.zeros((13, 21, 4), np.float32)
+    for x, y, width, height in [(3, 2, 17, 9), (20, 11, 1, 1), (0, 0, 8, 1)]:
+        program.dispatch((x, y, width, height))
+        gpu.barrier()
+        rows, columns = np.mgrid[y : y + height, x : x + width]
+        expected[y : y + height, x : x + width] += np.stack([columns, rows, 2 + 0 * rows, 1 + 0 * rows], axis=-1)
+    np.testing.assert_array_equal(texture.read(), expected)
+    texture.release()
+
+
+def test_a_fault_in_a_compute_shader_names_file_and_line(library, folder):
+    write(folder, "wrong.comp", '#include "lib/compute.glsl"\nvoid main() {\n    nothing;\n}\n')
+    with pytest.raises(ShaderError, match=r"^wrong\.comp:3: [^\n]*$"):
+        library.program("wrong.comp", folder=folder)
 
 
 # Flattening
@@ -106,7 +142,7 @@ def test_a_missing_file_gets_the_list_of_shaders_and_nothing_else(folder):
         flatten("zzz", [folder, package_shaders()], {})
     known = str(raised.value).partition("known: ")[2].split(", ")
     assert {"own.frag", "lighting.frag", "lib/lights/light.glsl"} <= set(known)
-    assert {Path(name).suffix for name in known} <= {".vert", ".frag", ".geom", ".tesc", ".tese", ".glsl"}
+    assert {Path(name).suffix for name in known} <= {".vert", ".frag", ".geom", ".tesc", ".tese", ".comp", ".glsl"}
 
 
 # Compiling

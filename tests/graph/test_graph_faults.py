@@ -13,7 +13,7 @@ from deferred_ir.base.errors import GraphError
 from deferred_ir.graph.compile import compile
 from deferred_ir.graph.facts import NOTHING_KNOWN, Facts
 from deferred_ir.graph.graph import Graph
-from deferred_ir.graph.ports import Buffer, Output
+from deferred_ir.graph.ports import Buffer, Output, Texture
 
 
 def faults(broken: Graph, outputs: Sequence[str] = ("image",), facts: Facts = NOTHING_KNOWN, **options: Any) -> str:
@@ -92,6 +92,24 @@ def test_a_buffer_where_a_texture_is_wanted():
 
     broken = graph(vpl=(Lights(), {}), light=(Fake(reads("depth", format="rgba8")), {"depth": "vpl.out"}))
     assert faults(broken) == "light.depth wants rgba8, but vpl.out is light"
+
+
+@pytest.mark.parametrize(
+    ("description", "told"),
+    [
+        (Texture("depth32f"), "depth32f frame"),
+        (Texture("rgba8", copies=2), "rgba8 frame, 2 of them"),
+        (Buffer("light", 5, 80), "5 light"),
+    ],
+)
+def test_an_image_of_what_shaders_cannot_store_into(description, told):
+    class Stores(Fake):
+        def outputs(self, inputs):
+            return {"out": Output("", description, image=True)}
+
+    assert faults(graph(light=(Stores(), {}))) == (
+        f"light.out: shaders store into no {told}; declare one colour texture, such as rgba32f"
+    )
 
 
 def test_a_cycle_is_named():

@@ -14,7 +14,7 @@ ROOMS = (
 )
 MOST_FILES = 12
 LONGEST = 300
-SHADERS = {".glsl", ".vert", ".tesc", ".tese", ".geom", ".frag"}
+SHADERS = {".glsl", ".vert", ".tesc", ".tese", ".geom", ".frag", ".comp"}
 THIRD_PARTIES = {
     "moderngl": ("gl",),
     "glcontext": ("gl",),

@@ -19,8 +19,6 @@ layout(binding = UNIT_PIXELS) uniform usampler2D pixels;
 layout(binding = UNIT_BLEND) uniform usampler2D blend;
 #endif
 
-layout(location = 0) out vec4 filtered;
-
 bool on_surface(Sample s, Sample t, float off) {
     return t.depth > 0.0 && abs(dot(t.position - s.position, s.normal)) <= off
         && dot(t.shading_normal, s.shading_normal) >= cosine;
@@ -50,18 +48,17 @@ vec3 mean_of_lonely(ivec2 place, Sample s, float off) {
 }
 #endif
 
-void main() {
-    ivec2 place = ivec2(gl_FragCoord.xy);
-    vec4 own = texelFetch(irradiance, place, 0);
-    filtered = vec4(own.rgb, 0.0);
+// Filtered irradiance of the sample in a texel; alpha: standard deviation of its luminance.
+vec4 filter_sample(ivec2 place) {
+    vec4 own = texelFetch(irradiance, place, 0), filtered = vec4(own.rgb, 0.0);
     Sample s = read_sample(positions, sample_normals, place);
-    if (s.depth <= 0.0 || apart == 0) return;
+    if (s.depth <= 0.0 || apart == 0) return filtered;
     float pixel = 2.0 * length(frame.ray[1].xyz) * s.depth / float(textureSize(positions, 0).y);
     if (any(greaterThanEqual(place, grid))) {
 #if FIRST
         filtered.rgb = mean_of_lonely(place, s, slack * pixel);
 #endif
-        return;
+        return filtered;
     }
     float off = slack * pixel * float(apart), level = luminance(own.rgb);
 #if !FIRST
@@ -105,4 +102,5 @@ void main() {
 #else
     filtered.a = most * sqrt(squares) / total;
 #endif
+    return filtered;
 }

@@ -14,13 +14,10 @@ layout(binding = UNIT_SEEN) uniform usampler2D seen;
 layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
 #endif
 
-layout(location = 0) out vec4 irradiance;
-
-void main() {
-    ivec2 place = ivec2(gl_FragCoord.xy);
-    irradiance = vec4(0.0);
+vec4 light_sample(ivec2 place) {
+    vec4 irradiance = vec4(0.0);
     Sample s = read_sample(positions, sample_normals, place);
-    if (s.depth <= 0.0) return;
+    if (s.depth <= 0.0) return irradiance;
     uint bits = texelFetch(seen, place, 0).r;
     uvec4 chosen;
     vec4 weight;
@@ -37,4 +34,5 @@ void main() {
 #if HAS_NEAR_FIELD
     irradiance.rgb += texelFetch(near_field, place, 0).rgb;
 #endif
+    return irradiance;
 }

@@ -9,10 +9,10 @@ uniform int vpls;    // of the pool
 uniform int groups;  // of the pool
 uniform int frame_seed;
 
-layout(location = TARGET_NUMBERS) out uint number;
-layout(location = TARGET_LIST_POSITIONS) out vec4 position;
-layout(location = TARGET_LIST_NORMALS) out vec4 normal;
-layout(location = TARGET_LIST_EMISSIONS) out vec4 emission;
+struct Listed {
+    uint number;  // in the pool
+    vec4 position, normal, emission;
+};
 
 float before_group(int tile, int group) {
     return group == 0 ? 0.0 : texelFetch(chances, ivec2(group - 1, tile), 0).r;
@@ -23,10 +23,8 @@ float power_up_to(int vpl) {
     return texelFetch(pool, pool_place(vpl, 2), 0).a;
 }
 
-void main() {
-    int entry = int(gl_FragCoord.x), tile = int(gl_FragCoord.y);
-    number = 0u;
-    position = normal = emission = vec4(0.0);
+Listed draw_entry(int entry, int tile) {
+    Listed drawn = Listed(0u, vec4(0.0), vec4(0.0), vec4(0.0));
     uint seed = uint(frame_seed);
     float start = unit(hash(uint(tile) ^ hash(seed)));
     float mark = (float(entry) + 1.0 - start) / float(LIST_ENTRIES), part = 1.0 - unit(hash(ivec2(entry, tile), ~seed));
@@ -37,7 +35,7 @@ void main() {
         if (texelFetch(chances, ivec2(middle, tile), 0).r < mark) low = middle + 1;
         else high = middle;
     }
-    if (low >= groups) return;  // a pool without power
+    if (low >= groups) return drawn;  // a pool without power
     int group = low;
     int first = group * vpls / groups, last = (group + 1) * vpls / groups - 1;
     low = first;
@@ -50,9 +48,10 @@ void main() {
     float chance = before_group(tile, group + 1) - before_group(tile, group);
     float within = power_up_to(low) - (low == first ? 0.0 : power_up_to(low - 1));
     float weight = 1.0 / (float(LIST_ENTRIES) * chance * within);  // once over how often a list holds it
-    number = uint(low);
-    position = texelFetch(pool, pool_place(low, 0), 0);
-    normal = texelFetch(pool, pool_place(low, 1), 0);
-    position.a *= weight;
-    emission = vec4(texelFetch(pool, pool_place(low, 2), 0).rgb * weight, 0.0);
+    drawn.number = uint(low);
+    drawn.position = texelFetch(pool, pool_place(low, 0), 0);
+    drawn.normal = texelFetch(pool, pool_place(low, 1), 0);
+    drawn.position.a *= weight;
+    drawn.emission = vec4(texelFetch(pool, pool_place(low, 2), 0).rgb * weight, 0.0);
+    return drawn;
 }

@@ -209,7 +209,7 @@ def _check_context(device: str) -> list[Check]:
         found, _, mend = str(error).rpartition("; ")
         return [Check(name, False, found, mend)]
     extensions, info, code = context.extensions, context.info, context.version_code
-    costs = _check_costs(f"{opened.name}, OpenGL {info['GL_VERSION']}")
+    driver = opened.name, info["GL_VERSION"]
     devices.close(context, loader)
     enough = code >= devices.FLOOR
     return [
@@ -219,15 +219,16 @@ def _check_context(device: str) -> list[Check]:
             Check(feature, feature in extensions, "yes" if feature in extensions else fallback, optional=True)
             for feature, fallback in OPTIONAL_FEATURES.items()
         ),
-        costs,
+        _check_costs(*driver),
+        _check_stages(*driver),
     ]
 
 
-def _check_costs(driver: str) -> Check:
+def _check_costs(device: str, opengl: str) -> Check:
     """Look for what frames cost with this driver, which `render --within` starts from."""
     from deferred_ir.tuning import machine_costs
 
-    machine = machine_costs.describe_machine(driver)
+    machine = machine_costs.describe_machine(device, opengl)
     costs, anew = machine_costs.read(machine), "`deferred-ir doctor --calibrate` measures"
     if costs is None:
         return Check(
@@ -236,6 +237,17 @@ def _check_costs(driver: str) -> Check:
     slowest = max(costs.ms[-1])
     found = f"measured {costs.measured}, up to {slowest:.0f} ms, kept in {machine_costs.find_file(machine)}"
     return Check("costs of frames", True, found, f"{anew} anew", optional=True)
+
+
+def _check_stages(device: str, opengl: str) -> Check:
+    """Look for the passes that were tried in compute shaders with this driver."""
+    from deferred_ir.tuning import cache, stage_costs
+
+    name, costs = "compute shaders", stage_costs.read(cache.name_machine(device, opengl))
+    if costs is None:
+        return Check(name, False, "not tried; `deferred-ir doctor --calibrate` does", optional=True)
+    trials = "; ".join(f"{kind.rpartition('.')[2]} {trial}" for kind, trial in costs.passes.items())
+    return Check(name, True, trials, f"tried {costs.measured}", optional=True)
 
 
 def _check_extras() -> list[Check]:

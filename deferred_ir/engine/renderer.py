@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Container, Mapping, Sequence
 from contextlib import nullcontext
+from functools import cache
 from numbers import Integral
 from pathlib import Path
 from types import TracebackType
@@ -31,6 +32,8 @@ from deferred_ir.output.image import Image
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
+from deferred_ir.tuning.cache import name_machine
+from deferred_ir.tuning.stage_costs import list_computed
 
 
 class Renderer:
@@ -70,7 +73,7 @@ class Renderer:
         if max(size) > self.gpu.max_size:
             self.gpu.close()
             raise SettingError(f"size {size[0]}x{size[1]}: this driver draws at most {self.gpu.max_size} a side")
-        self.executor = Executor(self.gpu)
+        self.executor = Executor(self.gpu, cache(self._find_computed))
         self._timers = Timers(self.gpu)
         self._buffers: SceneBuffers | None = None
         self._tracer: Tracer | None = None
@@ -218,6 +221,10 @@ class Renderer:
             memory["textures"] += self._buffers.texture_bytes
             memory["buffers"] += self._buffers.buffer_bytes
         return memory
+
+    def _find_computed(self) -> frozenset[str]:
+        """Find the passes that were measured to run faster in compute shaders here, with the same pixels."""
+        return list_computed(name_machine(self.gpu.device.name, self.gpu.driver))
 
     @property
     def embree_seconds(self) -> float:

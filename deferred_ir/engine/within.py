@@ -121,8 +121,7 @@ def find_machine_costs(renderer: Renderer) -> MachineCosts:
 
 def describe_device(renderer: Renderer) -> str:
     """Name the machine and driver of a renderer."""
-    version = renderer.gpu.ctx.info["GL_VERSION"]
-    return machine_costs.describe_machine(f"{renderer.gpu.device.name}, OpenGL {version}")
+    return machine_costs.describe_machine(renderer.gpu.device.name, renderer.gpu.driver)
 
 
 def measure_machine(renderer: Renderer) -> MachineCosts:

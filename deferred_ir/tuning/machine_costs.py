@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
-import logging
-import os
-import platform
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import date
-from importlib import metadata
 from pathlib import Path
 
-from deferred_ir.base.errors import OutputError
-from deferred_ir.base.files import write_json
+from deferred_ir.tuning import cache
 from deferred_ir.tuning.ladder import GRAPH, RUNGS
 
-log = logging.getLogger("deferred_ir")
-
-DISTRIBUTION = "deferred-ir"
+KIND = "costs"
 SIZES = (96, 288)
 """Sides of the images that are measured, pixels: two tell what is paid for each frame and what for each pixel."""
 
@@ -43,26 +36,15 @@ class MachineCosts:
         return float(max(small + slope * (pixels - few), 0.1 * small))
 
 
-def describe_machine(driver: str) -> str:
-    """Name what costs depend on: processor, driver, version of the package, and the ladder."""
+def describe_machine(device: str, opengl: str) -> str:
+    """Name what costs depend on: the machine as in `name_machine`, and the ladder."""
     ladder = hashlib.sha256(repr((GRAPH, RUNGS, SIZES)).encode()).hexdigest()[:8]
-    version = metadata.version(DISTRIBUTION)
-    return f"{_name_processor()}, {os.cpu_count()} cores; {driver}; {DISTRIBUTION} {version}, ladder {ladder}"
-
-
-def _name_processor() -> str:
-    info = Path("/proc/cpuinfo")
-    lines = info.read_text().splitlines() if info.exists() else []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()
+    return f"{cache.name_machine(device, opengl)}, ladder {ladder}"
 
 
 def find_file(machine: str) -> Path:
     """Return where the costs of a machine are kept."""
-    import platformdirs
-
-    name = hashlib.sha256(machine.encode()).hexdigest()[:12]
-    return Path(platformdirs.user_cache_dir(DISTRIBUTION, appauthor=False)) / f"costs-{name}.json"
+    return cache.find_file(KIND, machine)
 
 
 def read(machine: str) -> MachineCosts | None:
@@ -80,10 +62,5 @@ def read(machine: str) -> MachineCosts | None:
 def keep(machine: str, ms: Sequence[Sequence[float]]) -> MachineCosts:
     """Write costs that were measured just now. Where they cannot be written they are good for this process only."""
     costs = MachineCosts(machine, ms, date.today().isoformat())
-    file = find_file(machine)
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write_json(file, asdict(costs))
-    except (OSError, OutputError) as error:
-        log.warning("the costs of this machine cannot be kept: %s", error)
+    cache.keep(find_file(machine), asdict(costs))
     return costs

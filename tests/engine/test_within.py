@@ -141,11 +141,16 @@ def test_what_makes_no_sense_is_one_line(tmp_path, capsys, words):
     find_fault(capsys, tmp_path, "render", "cornell", *SMALL, "-o", str(tmp_path / "o.npy"), *words)
 
 
-def test_doctor_tells_the_costs_and_measures_them_anew(capsys):
+def test_doctor_tells_the_costs_and_measures_them_anew(capsys, monkeypatch):
+    monkeypatch.setattr("deferred_ir.profiling.checks.stages.SIZE", SIZE)
     main(["doctor", "--device", "software"])
-    assert re.search(r"- +costs of frames +not known; render --within measures them first", capsys.readouterr().out)
+    told = capsys.readouterr().out
+    assert re.search(r"- +costs of frames +not known; render --within measures them first", told)
+    assert re.search(r"- +compute shaders +not tried; `deferred-ir doctor --calibrate` does", told)
     main(["doctor", "--device", "software", "--calibrate"])
+    told = capsys.readouterr().out
     most = rf"up to {10 * len(RUNGS)} ms"
-    assert re.search(
-        rf"ok +costs of frames +measured \d{{4}}-\d\d-\d\d, {most}, kept in .*costs-", capsys.readouterr().out
-    )
+    assert re.search(rf"ok +costs of frames +measured \d{{4}}-\d\d-\d\d, {most}, kept in .*costs-", told)
+    trial = r"{} [\d.]+ ms, computed [\d.]+ ms, (used|slower|other pixels); "
+    passes = "".join(trial.format(name) for name in ("list_vpls", "light_samples", "filter_samples"))
+    assert re.search(rf"ok +compute shaders +{passes}tried \d{{4}}-\d\d-\d\d", told)

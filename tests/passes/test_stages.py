@@ -10,10 +10,20 @@ from small_scenes import room, smooth_scene
 from deferred_ir.cli.main import main
 from deferred_ir.graph.file import load_graph
 from deferred_ir.loading.load import load
+from deferred_ir.tuning import stage_costs
+from deferred_ir.tuning.cache import name_machine
+from deferred_ir.tuning.stage_costs import Trial
 
 PASSES = "list_vpls", "light_samples", "filter_samples"
 UNWRITTEN = 1 << 24
 """A number that no pass writes."""
+MODULES = {name: f"deferred_ir.passes.{name}" for name in PASSES}
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """A cache folder of the test's own."""
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(tmp_path / "cache"))
 
 
 def stages(stage, names=PASSES):
@@ -80,7 +90,32 @@ def test_averaged_frames_and_reused_ones_are_the_same(renderer):
         assert same_pixels(kept.render(scene, vpls=8, seed=seed), computed.render(scene, vpls=8, seed=seed))
 
 
-def test_the_record_tells_the_stage_of_each_pass(tmp_path):
+# What was measured
+
+
+def test_by_itself_a_pass_runs_in_fragment_shaders(renderer, cache):
+    one = renderer((16, 12), "resampled")
+    one.render(room(), vpls=4)
+    assert one.executor.stages() == dict.fromkeys(PASSES, "fragment")
+
+
+@pytest.mark.parametrize(
+    ("trial", "stage"),
+    [
+        (Trial(2.0, 1.0, equal=True), "compute"),
+        (Trial(1.0, 2.0, equal=True), "fragment"),
+        (Trial(2.0, 1.0, equal=False), "fragment"),
+    ],
+    ids=["faster", "slower", "other pixels"],
+)
+def test_what_was_measured_decides(renderer, cache, trial, stage):
+    one = renderer((16, 12), "resampled", set={"list_vpls.stage": "fragment"})
+    stage_costs.keep(name_machine(one.gpu.device.name, one.gpu.driver), dict.fromkeys(MODULES.values(), trial))
+    one.render(room(), vpls=4)
+    assert one.executor.stages() == {**dict.fromkeys(PASSES, stage), "list_vpls": "fragment"}
+
+
+def test_the_record_tells_the_stage_of_each_pass(cache, tmp_path):
     run = tmp_path / "run.json"
     words = ["--graph", "resampled", "--size", "16x12", "--vpls", "4", "--device", "software"]
     words += ["--set", "light_samples.stage=compute", "-o", str(tmp_path / "o.npy"), "--json", str(run)]

@@ -19,6 +19,7 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.graph.stages import Stage, stage_param
 from deferred_ir.pool.effort import accept_effort, read_effort
 from deferred_ir.pool.samples import draw_samples, read_layout
 
@@ -32,6 +33,7 @@ class Params:
 
     draws: int = param(32, lo=1, hi=4096, doc="VPLs of the list that a sample looks at (M); `rays` divides it.")
     rays: int = param(4, lo=1, hi=MOST_RAYS, doc="VPLs that it keeps (K), each of which a ray is traced to.")
+    stage: Stage = stage_param()
 
 
 class ChooseVpls(Pass):
@@ -69,8 +71,10 @@ class ChooseVpls(Pass):
         defines = {"RAYS": rays, "CHOICE_LAYERS": layers}
         which, weights = Texture("rgba32ui", layers=layers), Texture("rgba32f", layers=layers)
         return {
-            "choices": Output("places in the lists, tile by tile; four a layer", which, defines, transient=True),
-            "weights": Output("by which each choice stands for others", weights, transient=True),
+            "choices": Output(
+                "places in the lists, tile by tile; four a layer", which, defines, image=True, transient=True
+            ),
+            "weights": Output("by which each choice stands for others", weights, image=True, transient=True),
         }
 
     def depends(self) -> frozenset[str]:
@@ -85,7 +89,7 @@ class ChooseVpls(Pass):
         """Choose."""
         draws = self.params.draws * read_effort(io.step.descriptions)
         defines = {"SMOOTH": int(frame.smooth), "DRAWS": draws}
-        program = io.program("choose_vpls.frag", defines=defines)
+        program = io.stage_program("choose_vpls/choose", defines)
         program.set(frame_seed=frame.seed & 0x7FFFFFFF, area=frame.scene.geometry.diagonal**2)
         draw_samples(io, program, read_layout(io))
 

@@ -1,9 +1,9 @@
 """Measure passes in fragment and in compute shaders, and whether both give the same bits.
 
-    python -m deferred_ir.profiling.checks.stages cornell atrium --size 512x512 --turns 9
+    python -m deferred_ir.profiling.checks.stages cornell atrium --size 512x512 --turns 61
 
-Times are medians of the GPU's, taken in turns. `deferred-ir doctor --calibrate` keeps them, and the passes whose
-parameter `stage` is "auto" go by that.
+Times are the GPU's, medians over turns. `deferred-ir doctor --calibrate` keeps such times, and passes whose parameter
+`stage` is "auto" go by them.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ GRAPH = "resampled"
 SCENES = "cornell", "atrium"
 """Scenes by which a machine is judged."""
 SIZE = 512, 512
-TURNS = 5
+TURNS = 9
 
 
 def try_stages(renderer: Renderer, scene: Scene, turns: int) -> dict[str, Trial]:

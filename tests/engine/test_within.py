@@ -151,6 +151,6 @@ def test_doctor_tells_the_costs_and_measures_them_anew(capsys, monkeypatch):
     told = capsys.readouterr().out
     most = rf"up to {10 * len(RUNGS)} ms"
     assert re.search(rf"ok +costs of frames +measured \d{{4}}-\d\d-\d\d, {most}, kept in .*costs-", told)
-    trial = r"{} [\d.]+ ms, computed [\d.]+ ms, (used|slower|other pixels); "
-    passes = "".join(trial.format(name) for name in ("list_vpls", "light_samples", "filter_samples"))
+    trial = r"{} [\d.]+ ms, computed [\d.]+ ms, (used|not faster|other pixels); "
+    passes = "".join(trial.format(name) for name in ("list_vpls", "choose_vpls", "light_samples", "filter_samples"))
     assert re.search(rf"ok +compute shaders +{passes}tried \d{{4}}-\d\d-\d\d", told)

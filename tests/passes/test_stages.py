@@ -14,7 +14,7 @@ from deferred_ir.tuning import stage_costs
 from deferred_ir.tuning.cache import name_machine
 from deferred_ir.tuning.stage_costs import Trial
 
-PASSES = "list_vpls", "light_samples", "filter_samples"
+PASSES = "list_vpls", "choose_vpls", "light_samples", "filter_samples"
 UNWRITTEN = 1 << 24
 """A number that no pass writes."""
 MODULES = {name: f"deferred_ir.passes.{name}" for name in PASSES}

@@ -11,7 +11,7 @@ stages = import_module("deferred_ir.profiling.checks.stages")
 def test_it_prints_a_row_for_each_scene_and_pass(capsys):
     stages.main(["colors", "--size", "33x25", "--turns", "2", "--device", "software"])
     rows = re.findall(r"\| colors \| `(\w+)` \| [\d.]+ \| [\d.]+ \| [\d.]+ \| yes \|", capsys.readouterr().out)
-    assert rows == ["list_vpls", "light_samples", "filter_samples"]
+    assert rows == ["list_vpls", "choose_vpls", "light_samples", "filter_samples"]
 
 
 def test_a_pass_that_gives_other_bits_is_found(renderer, monkeypatch):

@@ -12,8 +12,10 @@ layout(binding = UNIT_LIST_NORMALS) uniform sampler2D list_normals;
 uniform int frame_seed;
 uniform float area;  // makes the kernel a number without unit
 
-layout(location = TARGET_CHOICES) out uvec4 choices[CHOICE_LAYERS];
-layout(location = TARGET_WEIGHTS) out vec4 weights[CHOICE_LAYERS];
+struct Choices {  // four a layer
+    uvec4 places[CHOICE_LAYERS];  // in the lists, tile by tile
+    vec4 weights[CHOICE_LAYERS];
+};
 
 const int STRIDE = LIST_ENTRIES / DRAWS, EACH = DRAWS / RAYS;
 const float GOLDEN_RATIO = 0.618034;
@@ -27,13 +29,15 @@ int choose_tile(ivec2 place, ivec2 size, uint random) {
     return tile.y * TILES + tile.x;
 }
 
-uvec4 kept_places[CHOICE_LAYERS];
-vec4 kept_weights[CHOICE_LAYERS];
-
-void choose(ivec2 place) {
+Choices choose_vpls(ivec2 place) {
+    Choices chosen;
+    for (int layer = 0; layer < CHOICE_LAYERS; ++layer) {
+        chosen.places[layer] = uvec4(NOBODY);
+        chosen.weights[layer] = vec4(0.0);
+    }
     ivec2 size = textureSize(positions, 0);
     Sample s = read_sample(positions, sample_normals, place);
-    if (s.depth <= 0.0) return;
+    if (s.depth <= 0.0) return chosen;
     uint random = hash(place, uint(frame_seed)), block = hash(place >> 2, uint(frame_seed) ^ 0x5bd1e995u);
     int tile = choose_tile(place, size, random);
     // The samples of a block start at different entries, each as often at one as at another, and their random numbers are
@@ -57,18 +61,9 @@ void choose(ivec2 place) {
             choice = take ? candidate : choice;
         }
         if (kept > 0.0) {
-            kept_places[k / 4][k % 4] = uint(tile * LIST_ENTRIES + choice);
-            kept_weights[k / 4][k % 4] = sum / kept * float(STRIDE);
+            chosen.places[k / 4][k % 4] = uint(tile * LIST_ENTRIES + choice);
+            chosen.weights[k / 4][k % 4] = sum / kept * float(STRIDE);
         }
     }
-}
-
-void main() {
-    for (int layer = 0; layer < CHOICE_LAYERS; ++layer) {
-        kept_places[layer] = uvec4(NOBODY);
-        kept_weights[layer] = vec4(0.0);
-    }
-    choose(ivec2(gl_FragCoord.xy));
-    choices = kept_places;
-    weights = kept_weights;
+    return chosen;
 }

@@ -15,6 +15,7 @@ from deferred_ir.tuning.cache import name_machine
 from deferred_ir.tuning.stage_costs import Trial
 
 PASSES = "list_vpls", "choose_vpls", "light_samples", "filter_samples"
+MANY = {"sample_pixels.scale": 1, "vpl.clamp": 0.0, "choose_vpls.draws": 64, "choose_vpls.rays": 16}
 UNWRITTEN = 1 << 24
 """A number that no pass writes."""
 MODULES = {name: f"deferred_ir.passes.{name}" for name in PASSES}
@@ -55,7 +56,7 @@ def test_each_pass_with_a_choice_of_stage_is_tested_here():
     assert {node.name for node in nodes if hasattr(node.work.params, "stage")} == set(PASSES)
 
 
-@pytest.mark.parametrize("settings", [{}, {"sample_pixels.scale": 1, "vpl.clamp": 0.0}], ids=["half", "full"])
+@pytest.mark.parametrize("settings", [{}, MANY], ids=["few", "many"])
 @pytest.mark.parametrize("size", [(65, 47), (64, 64), (3, 1)], ids="{0[0]}x{0[1]}".format)
 @pytest.mark.parametrize("name", PASSES)
 def test_a_pass_writes_the_same_from_the_same(renderer, name, size, settings):
@@ -70,12 +71,13 @@ def test_a_pass_writes_the_same_from_the_same(renderer, name, size, settings):
 
 
 @pytest.mark.parametrize("size", [(65, 47), (96, 64)], ids="{0[0]}x{0[1]}".format)
+@pytest.mark.parametrize(("graph", "vpls"), [("resampled", 16), ("accurate", 128)])
 @pytest.mark.parametrize("name", ["cornell", "atrium"])
-def test_the_image_is_the_same(renderer, name, size):
+def test_the_image_is_the_same(renderer, name, graph, vpls, size):
     scene = load(name)
-    drawn, computed = (renderer(size, "resampled", set=stages(stage)) for stage in ("fragment", "compute"))
+    drawn, computed = (renderer(size, graph, set=stages(stage)) for stage in ("fragment", "compute"))
     for seed in range(2):
-        images = [one.render(scene, vpls=16, seed=seed).radiance for one in (drawn, computed)]
+        images = [one.render(scene, vpls=vpls, seed=seed).radiance for one in (drawn, computed)]
         assert_equal(*images)
         assert images[0].max() > 0
     assert drawn.executor.counters == computed.executor.counters

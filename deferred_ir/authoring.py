@@ -14,6 +14,7 @@ from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
+from deferred_ir.graph.stages import Stage, stage_param
 from deferred_ir.report.plan_text import summary
 
 __all__ = [
@@ -39,9 +40,11 @@ __all__ = [
     "Io",
     "Output",
     "Pass",
+    "Stage",
     "Statements",
     "Texture",
     "param",
+    "stage_param",
     "summary",
     "unwritten_reads",
 ]

@@ -20,6 +20,7 @@ from deferred_ir.gl.shaders import Program
 from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.pool.samples import read_layout
 from deferred_ir.shadows import shader_variants
 from deferred_ir.shadows.filter import ShadowFilter
 
@@ -48,6 +49,8 @@ class Lighting(Pass):
         "spotlight": Input("irradiance from the spotlight over its emission, instead of a map", "r32f", optional=True),
         "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
         "indirect": Input("irradiance from the VPLs, instead of adding them up", format="rgba32f", optional=True),
+        "layout": Input("where samples stand, if `indirect` is theirs", format="layout", optional=True),
+        "blend": Input("what a pixel takes of which samples", format="r32ui", optional=True),
         "lonely": Input("irradiance of lonely pixels that the filter has left out", format="rgba32f", optional=True),
         "views": Input("where the direct lights' maps are", format="view", optional=True),
         "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
@@ -81,6 +84,8 @@ class Lighting(Pass):
         io.gpu.ctx.blend_func = io.gpu.ctx.ONE, io.gpu.ctx.ONE
         if io["indirect"]:
             vpls = vpls[:0]
+            if io["blend"]:
+                program.set(offset=read_layout(io).offset)
         if culled:
             self._draw_culled(io, program, len(vpls))
         else:

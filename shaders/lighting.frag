@@ -26,6 +26,11 @@ layout(binding = UNIT_SPOTLIGHT) uniform sampler2D spotlight;
 #endif
 #if HAS_INDIRECT
 layout(binding = UNIT_INDIRECT) uniform sampler2D indirect;
+#if HAS_BLEND  // of samples
+#include "lib/pool/blend.glsl"
+layout(binding = UNIT_BLEND) uniform usampler2D blend;
+uniform ivec2 offset;
+#endif
 #if HAS_LONELY
 layout(binding = UNIT_LONELY) uniform sampler2D lonely;
 #endif
@@ -76,7 +81,11 @@ void main() {
         irradiance += light_irradiance(lights[i], p.position, p.normal, p.shading_normal) * visibility(lights[i], p);
 #endif
 #if HAS_INDIRECT  // with the near field in it
+#if HAS_BLEND && SCALE > 1
+    irradiance += blended(indirect, texelFetch(blend, pixel, 0).r, pixel, offset);
+#else
     irradiance += texelFetch(indirect, pixel, 0).rgb;
+#endif
 #if HAS_LONELY
     irradiance += texelFetch(lonely, pixel, 0).rgb;
 #endif

@@ -96,7 +96,7 @@ def test_a_change_of_quality_runs_the_denoiser_and_what_follows(renderer):
     plan = one.plan(scene, outputs=["radiance", "display"])
     one.draw(scene, plan)
     ran = {step.name for step in plan.steps} - set(one.executor.skipped)
-    assert ran == {"denoise_samples", "blend_samples", "lighting", "tonemap"}
+    assert ran == {"denoise_samples", "lighting", "tonemap"}
     assert not same_pixels(balanced, one.read(plan))
 
 

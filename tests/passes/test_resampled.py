@@ -273,7 +273,7 @@ def test_a_filters_slider_casts_nothing_and_asks_no_ray(renderer):
     plan = one.plan(scene)
     one.draw(scene, plan)
     ran = {step.name for step in plan.steps} - set(one.executor.skipped)
-    assert ran == {"filter_samples", "blend_samples", "lighting", "tonemap"}
+    assert ran == {"filter_samples", "lighting", "tonemap"}
 
 
 def test_what_a_scene_does_not_need_is_left_out(renderer):

@@ -25,3 +25,23 @@ float corner_weight(Corner corner, int i) {
     vec2 share = mix(1.0 - corner.fraction, corner.fraction, vec2(i & 1, i >> 1));
     return share.x * share.y;
 }
+
+// The light of a pixel that takes `shares` (passes/sample_pixels.py) of the samples around it: of those of the grid that lie
+// on its surface, or of its own sample.
+vec3 blended(sampler2D light, uint shares, ivec2 pixel, ivec2 offset) {
+    ivec2 size = textureSize(light, 0);
+    bool lonely = (shares & LONELY) != 0u;
+    if (lonely) {
+        int place = int(shares & ~LONELY);
+        return texelFetch(light, ivec2(place % size.x, place / size.x), 0).rgb;
+    }
+    Corner corner = find_corner(pixel, offset, size);
+    vec3 sum = vec3(0.0);
+    float total = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        float share = float(shares >> (7 * i) & 127u);
+        sum += share * texelFetch(light, corner_place(corner, i), 0).rgb;
+        total += share;
+    }
+    return sum / max(total, 1.0);
+}

@@ -20,6 +20,7 @@ from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.pool.samples import ASKERS, check_askers, draw_askers, read_layout
 from deferred_ir.shadows import shader_variants
 from deferred_ir.vpls.interleaving import SharesMeta, choose_window_side, find_share_starts
 
@@ -34,8 +35,7 @@ class Gather(Pass):
         "lonely_pixels": Input("numbers of the pixels with too few neighbours", format="r32ui"),
         "missing": Input("bits of the shares that each of them lacks", format="rg32ui"),
         "lonely_count": Input("how many there are", format="r32ui"),
-        "depth": Input("reversed depth", format="depth32f"),
-        "normals": Input("shading and geometric normal", format="rgba16"),
+        **ASKERS,
         "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
         "rays": Input(
             "which VPLs are seen: then they have no maps, and lonely pixels are left", "r32ui", optional=True
@@ -45,7 +45,7 @@ class Gather(Pass):
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return one texture of the frame's size."""
-        del inputs
+        check_askers(inputs)
         return {"irradiance": Output("irradiance from the VPLs", Texture("rgba32f"), transient=True)}
 
     def depends(self) -> frozenset[str]:
@@ -62,11 +62,13 @@ class Gather(Pass):
         gpu, vpls = io.gpu, io["vpls"]
         program = io.program("gather.frag")
         program.set(side=choose_window_side(frame.seed))
-        program.draw_fullscreen()
+        draw_askers(io, program)
         if io["rays"]:
             return
         defines = shader_variants.choose_for_pixels(frame, vpls.records)
         program = io.program("lonely_pixels/light.frag", "lonely_pixels/rows.vert", defines=defines)
+        if io["layout"] and len(vpls.records):
+            program.set(grid=read_layout(io).grid)
         io["irradiance"].bind_image(0)
         gpu.clip(1)  # to the rows that the list fills
         gpu.gl.ColorMask(0, 0, 0, 0)  # the shader stores where each pixel belongs

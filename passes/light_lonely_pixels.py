@@ -20,7 +20,7 @@ from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
-from deferred_ir.vpls.interleaving import find_share_starts
+from deferred_ir.vpls.interleaving import find_share_starts, sort_lonely_list
 from deferred_ir.vpls.ray_sum import ScaledSurfaces, ScaledVpls
 
 
@@ -56,8 +56,8 @@ class LightLonelyPixels(Pass):
         vpls, parts = io["vpls"].records, io["vpls"].description.parts
         count = int(io["lonely_count"].read()[0, 0, 0])
         bits = np.zeros((height * width, 2), np.uint32)
-        listed = io["lonely_pixels"].read().reshape(-1)[:count]
-        bits[listed] = io["missing"].read().reshape(-1, 2)[:count]
+        listed = sort_lonely_list(io["lonely_pixels"].read())[:count, 0]
+        bits[listed] = sort_lonely_list(io["missing"].read())[:count]
         seen = frame.read_surfaces(io["depth"], io["normals"])
         asking = seen.rows(np.flatnonzero(bits[seen.pixel].any(axis=1)))
         image = np.zeros((height * width, 4), np.float32)

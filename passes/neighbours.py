@@ -2,6 +2,7 @@
 
 A window of n x n pixels has each share once wherever it lies. Its pixels count where they lie on the pixel's own
 surface, which the G-buffer alone decides: where frames are reused, the pass is skipped while camera and models stand.
+Where samples ask, these are the pixels here, and those of the list, which have no neighbours, are lonely.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
+from deferred_ir.pool.samples import ASKERS, check_askers, draw_askers
 from deferred_ir.vpls.interleaving import SharesMeta, choose_window_side
 
 IMAGES = ("lonely_pixels", "missing", "lonely_count")
@@ -52,12 +54,12 @@ class Neighbours(Pass):
     Params = Params
     inputs: ClassVar[Mapping[str, Input]] = {
         "block": Input("edge of the blocks of pixels that the VPLs are dealt to", format="block"),
-        "depth": Input("reversed depth", format="depth32f"),
-        "normals": Input("shading and geometric normal", format="rgba16"),
+        **ASKERS,
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return bits for each pixel of the window, and a list with room for all pixels."""
+        check_askers(inputs)
         block = inputs["block"]
         assert isinstance(block, Buffer)
         window = Texture("rg32ui", layers=-(-block.parts // TAPS))
@@ -89,7 +91,7 @@ class Neighbours(Pass):
             fewest=self.params.fewest * io.meta("block", SharesMeta).n ** 2,
             side=choose_window_side(frame.seed),
         )
-        program.draw_fullscreen()
+        draw_askers(io, program)
         io.gpu.barrier()
 
 

@@ -9,6 +9,10 @@ layout(binding = UNIT_WINDOW) uniform usampler2DArray window;
 layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
 #endif
 
+#if HAS_LAYOUT
+uniform ivec2 grid;  // samples; those of the list, beyond it, are lonely
+#endif
+
 layout(location = 0) out vec4 irradiance;
 
 bool has(uint set, int number) {
@@ -16,7 +20,12 @@ bool has(uint set, int number) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy), size = textureSize(shares, 0), corner = window_corner(pixel, size);
+#if HAS_LAYOUT
+    ivec2 size = grid;
+#else
+    ivec2 size = textureSize(shares, 0);
+#endif
+    ivec2 pixel = ivec2(gl_FragCoord.xy), corner = window_corner(pixel, size);
     irradiance = vec4(0.0, 0.0, 0.0, 1.0);
     vec3 sum = vec3(0.0);
     int number = 0;  // of pixels in the sum

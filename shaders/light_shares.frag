@@ -1,5 +1,5 @@
-// Irradiance from the VPLs `first` to `end` of a block on the pixels of one share, in its sub-buffer.
-#include "lib/surface/pixel.glsl"
+// Irradiance from the VPLs `first` to `end` of a block on the pixels or samples of one share, in its sub-buffer.
+#include "lib/shares/askers.glsl"
 #include "lib/lights/vpl.glsl"
 #include "lib/shares/places.glsl"
 #if HAS_RAYS
@@ -13,8 +13,6 @@ layout(binding = UNIT_SHADOWS) uniform sampler2DArrayShadow shadows;
 layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
 #endif
 
-layout(binding = UNIT_DEPTH) uniform sampler2D depth;
-layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 uniform ivec2 share;
 uniform bool begins;  // the first of a share's draws, which later ones are added to
 uniform int first;
@@ -35,20 +33,18 @@ float visibility(int i, Pixel p) {
 }
 
 void main() {
-    ivec2 size = textureSize(depth, 0);
-    ivec2 pixel = whole_place(ivec2(gl_FragCoord.xy), share, size);
-    float d = texelFetch(depth, pixel, 0).r;
-    if (d <= 0.0) {  // background
+    ivec2 place = whole_place(ivec2(gl_FragCoord.xy), share, askers_size());
+    Pixel p;
+    if (!read_asker(place, p)) {  // background
         irradiance = vec4(0.0);
         return;
     }
-    Pixel p = read_pixel(normals, pixel, centre_ndc(pixel, size), d);
     vec3 sum = vec3(0.0);
     for (int i = first; i < end; ++i)
         sum += vpl_irradiance(vpls[i], p.position, p.normal, p.shading_normal) * visibility(i, p);
     sum *= float(INTERLEAVE * INTERLEAVE);
 #if HAS_NEAR_FIELD
-    if (begins) sum += texelFetch(near_field, pixel, 0).rgb;  // to be filtered with the rest
+    if (begins) sum += texelFetch(near_field, place, 0).rgb;  // to be filtered with the rest
 #endif
     irradiance = vec4(sum, 0.0);
 }

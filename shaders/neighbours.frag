@@ -1,13 +1,10 @@
 // Which pixels of the window of INTERLEAVE^2 pixels, or on the other side of the pixel, lie on the pixel's own surface;
-// and the list of lonely pixels, for which too few do.
-#include "lib/camera/frame.glsl"
-#include "lib/surface/gbuffer.glsl"
+// and the list of lonely pixels, for which too few do. Where samples ask, a pixel is a sample here, and its place a texel.
+#include "lib/shares/askers.glsl"
 #include "lib/shares/places.glsl"
 #include "lib/shares/window.glsl"
 #include "lib/shares/lonely.glsl"
 
-layout(binding = UNIT_DEPTH) uniform sampler2D depth;
-layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 layout(location = TARGET_WINDOW) out uvec4 window[GROUPS];
 layout(binding = 0, r32ui) uniform writeonly uimage2D lonely_pixels;
 layout(binding = 1, rg32ui) uniform writeonly uimage2D missing;
@@ -20,8 +17,8 @@ in vec2 ndc;
 
 struct Centre {
     ivec2 pixel, size;
-    float depth;
-    vec3 ray, across, up;  // the pixel's ray, and how rays change from pixel to pixel
+    float depth;           // 0 for the background
+    vec3 ray, across, up;  // the pixel's ray, and how rays change from pixel to pixel; for a sample its position, 0 and 0
     vec3 normal, shading_normal;
     vec2 code;  // of the shading normal
 };
@@ -30,20 +27,34 @@ Centre read_centre(ivec2 pixel, ivec2 size) {
     Centre c;
     c.pixel = pixel;
     c.size = size;
-    c.depth = texelFetch(depth, pixel, 0).r;
     vec4 code = texelFetch(normals, pixel, 0);
     decode_normals(code, c.shading_normal, c.normal);
     c.code = code.xy;
+#if HAS_POSITIONS
+    vec4 at = texelFetch(positions, pixel, 0);
+    c.depth = at.w;
+    c.ray = at.xyz;
+    c.across = c.up = vec3(0.0);
+#else
+    c.depth = texelFetch(depth, pixel, 0).r;
     c.across = frame.ray[0].xyz * (2.0 / float(size.x));
     c.up = frame.ray[1].xyz * (2.0 / float(size.y));
     c.ray = frame.ray[0].xyz * ndc.x + frame.ray[1].xyz * ndc.y + frame.ray[2].xyz;
+#endif
     return c;
 }
 
-// Whether a surface on the ray `ray`, at the reversed depth `d`, lies in the plane of the centre's.
-bool in_plane(Centre c, vec3 ray, float d) {
+// Whether the surface at `other`, a pixel on the ray `ray`, lies in the plane of the centre's.
+bool in_plane(Centre c, ivec2 other, vec3 ray) {
+#if HAS_POSITIONS
+    vec4 at = texelFetch(positions, other, 0);
+    float d = at.w;
+    vec3 off = at.xyz - c.ray;
+#else
     // From the centre's point to the other's, times both depths / near: no division, and 0 for the centre itself.
+    float d = texelFetch(depth, other, 0).r;
     vec3 off = ray * c.depth - c.ray * d;
+#endif
     float height = dot(c.normal, off);
     return d > 0.0 && height * height <= sine_squared * dot(off, off);
 }
@@ -63,8 +74,7 @@ bool alike(Centre c, vec2 code) {
 bool counts(Centre c, ivec2 other) {
     vec2 away = vec2(other - c.pixel);
     bool inside = all(lessThan(uvec2(other), uvec2(c.size)));
-    return inside && in_plane(c, c.ray + c.across * away.x + c.up * away.y, texelFetch(depth, other, 0).r)
-        && alike(c, read_code(other));
+    return inside && in_plane(c, other, c.ray + c.across * away.x + c.up * away.y) && alike(c, read_code(other));
 }
 
 // Sets of up to 64 numbers, in words of 32 bits.
@@ -88,7 +98,7 @@ void write_window(uvec2 found, uvec2 x, uvec2 y, bool lonely) {
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy), size = textureSize(depth, 0), corner = window_corner(pixel, size);
+    ivec2 pixel = ivec2(gl_FragCoord.xy), size = askers_size(), corner = window_corner(pixel, size);
     Centre c = read_centre(pixel, size);
     uvec2 found = uvec2(0u), x = uvec2(0u), y = uvec2(0u);  // taps
     if (c.depth <= 0.0) {  // background
@@ -104,7 +114,7 @@ void main() {
         uint same = 0u, other = 0u;
         for (int i = 0; i < N; ++i) {
             ivec2 tap = corner + ivec2(i, row);
-            bool plane = in_plane(c, columns[i] + up, texelFetch(depth, tap, 0).r), equal = read_code(tap) == c.code;
+            bool plane = in_plane(c, tap, columns[i] + up), equal = read_code(tap) == c.code;
             same |= uint(plane && equal) << i;
             other |= uint(plane && !equal) << i;
         }
@@ -112,6 +122,8 @@ void main() {
         found[word] |= (same & inside) << (row * N & 31);
         bent[word] |= (other & inside) << (row * N & 31);
     }
+    bool listed = any(greaterThanEqual(pixel, size));  // a sample of the list
+    if (listed) found = bent = uvec2(0u);
     if (!alike(c, c.code)) found = uvec2(0u);
     // Few normals are to be compared where surfaces are flat. The loop takes as many turns as the pixel with most has.
     for (int word = 0; word < WORDS; ++word)
@@ -122,6 +134,7 @@ void main() {
     int number = bitCount(found.x) + bitCount(found.y);
     bool lonely = float(number) <= fewest && number < TAPS;
     uvec2 absent = uvec2(0u);  // shares
+    ivec2 texture_size = textureSize(normals, 0);
     int tries = lonely ? 0 : 3;
     for (int word = 0; word < WORDS; ++word)
         for (uint gaps = ~found[word] & ALL; gaps != 0u; gaps &= gaps - 1u) {  // as often as the pixel with most gaps has
@@ -137,8 +150,8 @@ void main() {
         }
     write_window(found, x, y, lonely);
     if (lonely) {
-        ivec2 place = list_place(imageAtomicAdd(lonely_count, ivec2(0), 1u), size.x);
-        imageStore(lonely_pixels, place, uvec4(pixel.y * size.x + pixel.x));
+        ivec2 place = list_place(imageAtomicAdd(lonely_count, ivec2(0), 1u), texture_size);
+        imageStore(lonely_pixels, place, uvec4(pixel.y * texture_size.x + pixel.x));
         imageStore(missing, place, uvec4(absent, 0u, 0u));
     }
 }

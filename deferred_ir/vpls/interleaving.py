@@ -65,6 +65,16 @@ def find_places(pixel: Ints, size: tuple[int, int], n: int) -> tuple[Ints, Ints]
     return y % n * n + x % n, (rows[y % n] + y // n) * width + columns[x % n] + x // n
 
 
+def sort_lonely_list(texels: Ints) -> Ints:
+    """Return the entries of a list of lonely pixels in their order, (H * W, channels).
+
+    texels: (H, W, channels), as the texture has them (shaders/lib/shares/lonely.glsl): pairs of rows, column by column.
+    """
+    height, width, channels = texels.shape
+    paired = texels[: height // 2 * 2].reshape(-1, 2, width, channels).swapaxes(1, 2)
+    return np.concatenate([paired.reshape(-1, channels), texels[height // 2 * 2 :].reshape(-1, channels)])
+
+
 def choose_window_side(seed: int) -> tuple[int, int]:
     """Return on which side in x and in y the filter's even window has a pixel more: 0 before its centre, 1 behind it.
 

@@ -1,5 +1,5 @@
 // Adds to each lonely pixel the light of its missing shares' VPLs in one block.
-#include "lib/surface/pixel.glsl"
+#include "lib/shares/askers.glsl"
 #include "lib/lights/vpl.glsl"
 #include "lib/shares/lonely.glsl"
 #if HAS_SHADOWS
@@ -8,8 +8,6 @@
 layout(binding = UNIT_SHADOWS) uniform sampler2DArrayShadow shadows;
 #endif
 
-layout(binding = UNIT_DEPTH) uniform sampler2D depth;
-layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 layout(binding = UNIT_LONELY_PIXELS) uniform usampler2D lonely_pixels;
 layout(binding = UNIT_LONELY_COUNT) uniform usampler2D lonely_count;
 layout(binding = UNIT_MISSING) uniform usampler2D missing;
@@ -25,10 +23,11 @@ float visibility(Vpl vpl, Pixel p) {
 }
 
 void main() {
-    ivec2 place = ivec2(gl_FragCoord.xy), size = textureSize(depth, 0);
-    if (uint(place.y * size.x + place.x) >= texelFetch(lonely_count, ivec2(0), 0).r) return;
+    ivec2 place = ivec2(gl_FragCoord.xy), size = textureSize(normals, 0);
+    if (list_entry(place, size) >= texelFetch(lonely_count, ivec2(0), 0).r) return;
     ivec2 pixel = pixel_of(texelFetch(lonely_pixels, place, 0).r, size.x);
-    Pixel p = read_pixel(normals, pixel, centre_ndc(pixel, size), texelFetch(depth, pixel, 0).r);
+    Pixel p;
+    read_asker(pixel, p);
     vec3 sum = vec3(0.0);
     uvec2 bits = texelFetch(missing, place, 0).rg;
     const int shares = INTERLEAVE * INTERLEAVE;

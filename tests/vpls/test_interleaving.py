@@ -16,7 +16,7 @@ from deferred_ir.loading.load import load
 from deferred_ir.rays.pixel_surfaces import decode_gbuffer
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.vpls.interleaving import deal, find_share_starts, find_sub_buffers
+from deferred_ir.vpls.interleaving import deal, find_share_starts, find_sub_buffers, sort_lonely_list
 
 ANGLE = np.radians(25)
 ABOVE = Camera((0.0, 3.0, 0.001), (0.0, 0.0, 0.0), fov=30.0)
@@ -96,8 +96,9 @@ def test_the_filter_is_what_it_says(renderer, n, size):
     depth, normals = read_port(one, "gbuffer.depth")[..., 0], read_port(one, "gbuffer.normals")
     shares = read_port(one, "light_shares.shares")[..., :3]
     expected, lonely = gather_by_definition(scene, n, 0.5, shares, (depth, normals))
-    listed = read_port(one, "neighbours.lonely_pixels").ravel()[: read_port(one, "neighbours.lonely_count").item()]
-    assert sorted(listed) == np.flatnonzero(lonely).tolist()
+    count = read_port(one, "neighbours.lonely_count").item()
+    listed = sort_lonely_list(read_port(one, "neighbours.lonely_pixels"))[:count]
+    assert sorted(listed[:, 0]) == np.flatnonzero(lonely).tolist()
     np.testing.assert_allclose(irradiance[~lonely], expected[~lonely], rtol=2e-5, atol=1e-6)
 
 

@@ -1,18 +1,19 @@
 """Ask by rays how the spotlight lights each pixel: lights, G-buffer -> spotlight.
 
 A shader says how strongly a point light would light each pixel and where its ray starts; these are read back, Embree
-traces on the CPU, and the answers go up. Rays to a disc start from the G-buffer, read back. No light needs a map.
+traces on the CPU, and the answers go up. Rays to a disc start from the G-buffer, read back. The light needs no map.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
-from deferred_ir.frame.facts import EMITS
+from deferred_ir.frame.costs import estimate_direct_map_cost, estimate_direct_ray_cost
+from deferred_ir.frame.facts import EMITS, PIXELS, SOFT, SOFTWARE, TRIANGLES
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.facts import Facts
@@ -23,6 +24,7 @@ from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.rays.direct import trace_spotlight
 from deferred_ir.rays.pixel_surfaces import PixelJob
 from deferred_ir.rays.tracer import OFFSET
+from deferred_ir.shadows.settings import SPOT_MAP
 
 RAYS = Figure("direct_rays", "Shadow rays to a point light.", ("direct_rays",))
 
@@ -31,6 +33,11 @@ RAYS = Figure("direct_rays", "Shadow rays to a point light.", ("direct_rays",))
 class Params:
     """Parameters of direct light by rays."""
 
+    visibility: Literal["auto", "maps", "rays"] = param(
+        "auto",
+        doc="Whether the spotlight's shadow comes from its map, where the graph draws one, or from rays; auto: from "
+        "whichever should take less time.",
+    )
     disc_samples: int = param(
         16, lo=1, hi=64, doc="Points of the spotlight's disc that a pixel traces rays to, where it has a radius."
     )
@@ -58,8 +65,16 @@ class DirectRays(Pass):
         }
 
     def unneeded(self, facts: Facts) -> str | None:
-        """Leave the pass out where the light is off."""
-        return None if facts[EMITS] else "the spotlight emits nothing"
+        """Leave the pass out where the light is off, or where a map is chosen or should take less time."""
+        if not facts[EMITS]:
+            return "the spotlight emits nothing"
+        if self.params.visibility == "rays" or not facts[SPOT_MAP]:
+            return None
+        if self.params.visibility == "maps":
+            return "visibility is 'maps'"
+        rays = estimate_direct_ray_cost(facts[PIXELS], self.params.disc_samples if facts[SOFT] else 1)
+        drawn = estimate_direct_map_cost(facts[TRIANGLES], software=facts[SOFTWARE])
+        return f"the spotlight's map should take less time: {drawn:.2g} ms, rays {rays:.2g}" if drawn < rays else None
 
     def depends(self) -> frozenset[str]:
         """The rays' ends, and what lies between."""

@@ -18,13 +18,13 @@ from deferred_ir.frame.direct_lights import find_view_owners
 from deferred_ir.frame.facts import EMITS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.facts import Facts
+from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.shadows import figures, mesh_choice
 from deferred_ir.shadows.atlas_cache import AtlasCache
 from deferred_ir.shadows.paraboloid import MapBatch, draw_curved
-from deferred_ir.shadows.settings import MapParams
+from deferred_ir.shadows.settings import SPOT_MAP, MapParams
 from deferred_ir.shadows.views import CAPACITY, describe_output, pack_views
 
 
@@ -38,6 +38,7 @@ class ShadowMaps(Pass):
         "lights": Input("the direct lights to draw maps for", format="light"),
         "vpls": Input("the VPLs to draw maps for", format="vpl"),
         "rays": Input("which lights are seen, by rays: then none needs a map", optional=True, replaces=True),
+        "spotlight": Input("the spotlight's light, by rays: then it needs no map", format="r32f", optional=True),
     }
 
     def _tiles_per_layer(self) -> int:
@@ -62,6 +63,11 @@ class ShadowMaps(Pass):
         )
         doc = "reversed depth; layer 0 the spotlight's, then tiles of VPLs"
         return {"atlas": Output(doc, atlas, defines), "views": describe_output()}
+
+    def state_facts(self, facts: Facts) -> Statements:
+        """State that the spotlight may have a map."""
+        del facts
+        return {SPOT_MAP: True}
 
     def unneeded(self, facts: Facts) -> str | None:
         """Return a reason if the spotlight is dark: then there are no VPLs either."""
@@ -88,22 +94,26 @@ class ShadowMaps(Pass):
             for i in range(_count_vpls(inputs))
         ]
         parts = [{**tile, "state": "dirty", "why": why} for tile in [spot, *tiles]]
-        return state.describe(parts) if state and state.frame else parts
+        if state and state.frame:
+            return state.describe(parts)
+        return parts[1:] if inputs["spotlight"] else parts
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Clear and draw the maps that the atlas does not hold already."""
         views, vpls = pack_views(frame, self.params, self._edge()), io["vpls"].records
         io["views"].write(views)
-        maps = AtlasCache.begin(io, self.params, find_view_owners(frame.scene), all_tiles=frame.keep_all)
+        owners = find_view_owners(frame.scene)[: 0 if io["spotlight"] else None]
+        maps = AtlasCache.begin(io, self.params, owners, all_tiles=frame.keep_all)
         self.params.prepare(io.gpu)
         io["views"].bind()
         for curved in (False, True):
-            chosen = np.flatnonzero(maps.dirty[: len(views)] & ((views["paraboloid"] > 0) == curved))
+            drawn = views[: len(owners)]
+            chosen = np.flatnonzero(maps.dirty[: len(drawn)] & ((drawn["paraboloid"] > 0) == curved))
             batch = MapBatch(views, chosen, self.params.spot_size, vpls=False, curved=curved)
             self._draw(frame.buffers.cluster_buffers, io, batch)
         if len(vpls):
             mesh, curved = mesh_choice.choose_mesh(frame, self.params), self.params.projection == "paraboloid"
-            block, dirty = io["vpls"].description.block, maps.dirty[len(views) :]
+            block, dirty = io["vpls"].description.block, maps.dirty[len(owners) :]
             for start in range(0, len(vpls), block):
                 io["vpls"].bind(start // block)
                 chosen = np.flatnonzero(dirty[start : start + block])

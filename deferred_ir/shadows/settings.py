@@ -9,8 +9,10 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import GraphError
+from deferred_ir.graph.facts import Fact
 from deferred_ir.graph.params import param
 
+SPOT_MAP = Fact("spot_map", unknown=False, doc="The graph can draw a shadow map of the spotlight.")
 MOST_LAYERS = 2048
 """Layers of an array texture that every driver of OpenGL 4.3 supports."""
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from small_scenes import GREY, Mesh, box, build, plane, room, textured
 
 from deferred_ir.base.errors import SettingError
-from deferred_ir.frame.facts import EMITS, TRIANGLES, collect_facts
+from deferred_ir.frame.facts import EMITS, SOFT, TRIANGLES, collect_facts
 from deferred_ir.graph.facts import Facts
 from deferred_ir.loading.load import load
 from deferred_ir.scene.motion import LissajousMotion, ModelMotion
@@ -51,7 +51,7 @@ def test_bounds_and_diagonal_are_those_of_what_faces_use():
 
 def test_facts_say_whether_the_light_shines_and_how_many_triangles_there_are():
     scene = room()
-    assert collect_facts(scene) == Facts({EMITS: True, TRIANGLES: 24})
+    assert collect_facts(scene) == Facts({EMITS: True, SOFT: False, TRIANGLES: 24})
     dim, dark = (replace(scene, spotlight=replace(scene.spotlight, emission=(0, 0, e))) for e in (1e-9, 0))
     assert dim.emits
     assert not dark.emits

@@ -61,14 +61,22 @@ class EmissionDisc:
         return points
 
     def unproject(self, points: Array) -> Array:
-        """Return the unit directions (n, 3) that belong to points (n, 2) of the disc, by bisection."""
+        """Return the unit directions (n, 3) that belong to points (n, 2) of the disc."""
         square = (points**2).sum(axis=1)
-        low, high = np.zeros(len(points)), np.ones(len(points))
-        for _ in range(53):  # bits of a float
-            middle = (low + high) / 2
-            below = self._within(middle) < square * self._all
-            low, high = np.where(below, middle, low), np.where(below, high, middle)
-        height = self._edge * high  # 1 - cos theta
+        height = self._edge * self._find_x(square * self._all)  # 1 - cos theta
         scale = np.sqrt(np.divide(height * (2 - height), square, out=np.zeros(len(points)), where=square > 0))
         directions: Array = (points * scale[:, None]) @ self._axes + (1 - height[:, None]) * self._axis
         return directions
+
+    def _find_x(self, within: Array) -> Array:
+        """Return x where F(x) is `within` (n,), (n,): the root of a square before the soft edge, by bisection there."""
+        x: Array = 2 * within / (1 + np.sqrt(np.maximum(1 - 2 * self._edge * within, 0)))
+        soft = np.flatnonzero(x > FLAT)
+        if len(soft):
+            low, high = np.full(len(soft), FLAT), np.ones(len(soft))
+            for _ in range(53):  # bits of a float
+                middle = (low + high) / 2
+                below = self._within(middle) < within[soft]
+                low, high = np.where(below, middle, low), np.where(below, high, middle)
+            x[soft] = high
+        return x

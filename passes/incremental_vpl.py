@@ -30,7 +30,7 @@ class Params(VplParams):
     """Parameters of VPLs that outlive their frame."""
 
     least: int = param(
-        4, lo=0, hi=65536, doc="VPLs that a frame may replace to improve their distribution; at most `most`."
+        2, lo=0, hi=65536, doc="VPLs that a frame may replace to improve their distribution; at most `most`."
     )
     most: int = param(
         8, lo=0, hi=65536, doc="Limit on the new VPLs in a frame, and so on the maps of VPLs that it draws."

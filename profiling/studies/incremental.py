@@ -3,7 +3,7 @@
     python -m deferred_ir.profiling.studies.incremental cornell atrium
 
 A spotlight without a motion is given a slow one. Frames of both graphs take turns, so that a noisy machine disturbs
-them alike; times are medians of GPU times.
+them alike; times are medians.
 """
 
 from __future__ import annotations
@@ -43,14 +43,15 @@ SEEDS = 3
 PATHS = 256
 FRESH = 16
 """Frames averaged for the reference of a moving light: without the VPLs' noise, but with their clamp and maps."""
-TIMES = (
-    *("scene", "fresh set, ms", "retained, ms", "times faster", "frame, ms", "frame retained, ms", "maps"),
-    "most maps",
-)
+TIMES = "scene", "fresh set, ms", "retained, all pixels, ms", "retained, ms", "times faster", "maps", "most maps"
 ERRORS = (
-    *("scene", "fresh Sobol set", "retained", "ratio", "flicker, random", "flicker, Sobol", "flicker, retained"),
-    "ratio",
+    *("scene", "error, fresh Sobol set", "retained, all pixels", "retained", "ratio"),
+    *("flicker, random", "Sobol", "retained, all pixels", "retained", "ratio"),
 )
+ALL_PIXELS = {"sample_pixels.scale": 1, "interleave.n": 4, "neighbours.fewest": 0.5}
+"""Settings with which VPLs light all pixels, as in `interleaved`."""
+MAPS = {"direct_rays.visibility": "maps"}
+"""Settings with which direct light is the same in all graphs: only that of VPLs is compared."""
 LAG = "scene", "fresh Sobol set", "retained, a budget of all maps", "retained, a budget of 8"
 
 
@@ -63,67 +64,70 @@ class Sizes:
 
 
 def times(scene: Scene, size: tuple[int, int]) -> dict[str, Any]:
-    """Return the milliseconds of VPLs and maps and of frames, retained and fresh, and the number of maps drawn."""
+    """Return the milliseconds of frames: fresh, retained, and retained with all pixels; and the number of maps."""
+    graphs = {"fresh": ("interleaved", {}), "whole": ("incremental", ALL_PIXELS), "retained": ("incremental", {})}
     with ExitStack() as stack:
-        retained, fresh = (stack.enter_context(Renderer(size, graph)) for graph in ("incremental", "interleaved"))
-        plans = {one: one.plan(scene, VPLS) for one in (retained, fresh)}
-        measured = {one: Measurement() for one in plans}
-        fresh.draw(scene, plans[fresh])
+        drawn = {
+            name: stack.enter_context(Renderer(size, graph, set=given, reuse=True))
+            for name, (graph, given) in graphs.items()
+        }
+        plans = {name: one.plan(scene, VPLS) for name, one in drawn.items()}
+        measured = {name: Measurement() for name in drawn}
         for frame in range(WARM):
-            retained.draw(scene, plans[retained], time=frame / FRAMES_PER_SECOND)
-        for turn, one in take_turns(list(plans), MOVING, f"{scene.name}, times"):
-            one.draw(scene, plans[one], time=(WARM + turn) / FRAMES_PER_SECOND, measurement=measured[one])
-        for one, measurement in measured.items():
-            one.finish(measurement)
-
-    def ms(one: Renderer) -> float:
-        return median(laps["vpl"][0] + laps["shadow_maps"][0] for laps in measured[one].laps)
-
-    maps = [counters["maps_drawn"] for counters in measured[retained].counters]
-    return {
-        "fresh": ms(fresh),
-        "retained": ms(retained),
-        "frame": median(measured[fresh].frame_ms),
-        "frame_retained": median(measured[retained].frame_ms),
-        "maps": median(maps),
-        "most": max(maps),
-    }
+            for name in ("whole", "retained") if frame < WARM - 1 else graphs:
+                drawn[name].draw(scene, plans[name], time=frame / FRAMES_PER_SECOND)
+        for turn, name in take_turns(list(drawn), MOVING, f"{scene.name}, times"):
+            time = (WARM + turn) / FRAMES_PER_SECOND
+            drawn[name].draw(scene, plans[name], time=time, measurement=measured[name])
+        for name, measurement in measured.items():
+            drawn[name].finish(measurement)
+    maps = [counters["maps_drawn"] for counters in measured["retained"].counters]
+    ms = {name: median(measurement.frame_ms) for name, measurement in measured.items()}
+    return {**ms, "maps": median(maps), "most": max(maps)}
 
 
 def errors(scene: Scene, size: tuple[int, int]) -> dict[str, float]:
     """Return the relMSE of a still light against paths: of a full retained set and of a fresh one."""
     scene = hold_light(scene)
     truth = trace_reference(scene, size, spp=PATHS).radiance
-    values = dict[str, list[float]](retained=[], sobol=[])
-    with Renderer(size, "incremental") as retained, Renderer(size, "interleaved") as fresh:
-        plan = retained.plan(scene, VPLS)
+    values = dict[str, list[float]](retained=[], whole=[], sobol=[])
+    with (
+        Renderer(size, "incremental") as retained,
+        Renderer(size, "incremental", set=ALL_PIXELS) as whole,
+        Renderer(size, "interleaved") as fresh,
+    ):
+        plans = {one: one.plan(scene, VPLS) for one in (retained, whole)}
         for seed in track(range(SEEDS), f"{scene.name}, errors"):
             for _ in range(WARM):
-                retained.draw(scene, plan, seed=seed)
-            image = retained.read(plan).radiance
+                for one, plan in plans.items():
+                    one.draw(scene, plan, seed=seed)
             hit = _hit(retained)
-            values["retained"].append(relmse(image, truth, hit)[0])
+            for name, one in (("retained", retained), ("whole", whole)):
+                values[name].append(relmse(one.read(plans[one]).radiance, truth, hit)[0])
             values["sobol"].append(relmse(fresh.render(scene, vpls=VPLS, seed=seed).radiance, truth, hit)[0])
     return {name: median(each) for name, each in values.items()}
 
 
 def flicker(scene: Scene, size: tuple[int, int]) -> dict[str, float]:
     """Return the mean change of a pixel's error from frame to frame, over the mean radiance."""
-    errors, brightness = dict[str, list[Array]](retained=[], sobol=[], random=[]), []
+    errors, brightness = dict[str, list[Array]](retained=[], whole=[], sobol=[], random=[]), []
     with (
-        Renderer(size, "incremental") as retained,
+        Renderer(size, "incremental", set=MAPS) as retained,
+        Renderer(size, "incremental", set=MAPS | ALL_PIXELS) as whole,
         Renderer(size, "interleaved") as sobol,
         Renderer(size, "interleaved", set={"vpl.pattern": "random"}) as random,
     ):
-        plan = retained.plan(scene, VPLS)
+        plans = {one: one.plan(scene, VPLS) for one in (retained, whole)}
         for frame in track(range(WARM + MOVING), f"{scene.name}, flicker"):
             time = frame / FRAMES_PER_SECOND
-            retained.draw(scene, plan, time=time)
+            for one, plan in plans.items():
+                one.draw(scene, plan, time=time)
             if frame < WARM:
                 continue
             truth = sobol.render(scene, vpls=VPLS, seed=1000, time=time, accumulate=FRESH).radiance
             images = {
-                "retained": retained.read(plan).radiance,
+                "retained": retained.read(plans[retained]).radiance,
+                "whole": whole.read(plans[whole]).radiance,
                 "sobol": sobol.render(scene, vpls=VPLS, time=time).radiance,
                 "random": random.render(scene, vpls=VPLS, seed=frame, time=time).radiance,
             }
@@ -144,8 +148,8 @@ def lag(scene: Scene, size: tuple[int, int]) -> dict[str, float]:
     """
     values = dict[str, list[float]](retained=[], whole=[], sobol=[])
     with (
-        Renderer(size, "incremental") as retained,
-        Renderer(size, "incremental", set={"vpl.most": VPLS}) as whole,
+        Renderer(size, "incremental", set=MAPS) as retained,
+        Renderer(size, "incremental", set=MAPS | {"vpl.most": VPLS}) as whole,
         Renderer(size, "interleaved") as fresh,
     ):
         plans = {one: one.plan(scene, VPLS) for one in (retained, whole)}
@@ -176,19 +180,20 @@ def _hit(renderer: Renderer) -> Bools:
 
 def row_of_times(scene: Scene, ms: Mapping[str, Any]) -> list[str]:
     """Return the cells of TIMES."""
-    ratio = ms["fresh"] / ms["retained"]
     return [
-        *(scene.name, f"{ms['fresh']:.1f}", f"{ms['retained']:.1f}", f"{ratio:.1f}"),
-        *(f"{ms[name]:.0f}" for name in ("frame", "frame_retained", "maps", "most")),
+        scene.name,
+        *(f"{ms[name]:.0f}" for name in ("fresh", "whole", "retained")),
+        f"{ms['fresh'] / ms['retained']:.1f}",
+        *(f"{ms[name]:.0f}" for name in ("maps", "most")),
     ]
 
 
 def row_of_errors(scene: Scene, error: Mapping[str, float], change: Mapping[str, float]) -> list[str]:
     """Return the cells of ERRORS."""
     return [
-        *(scene.name, f"{error['sobol']:.4f}", f"{error['retained']:.4f}"),
+        *(scene.name, f"{error['sobol']:.4f}", f"{error['whole']:.4f}", f"{error['retained']:.4f}"),
         f"{error['retained'] / error['sobol']:.2f}",
-        *(f"{change[name]:.4f}" for name in ("random", "sobol", "retained")),
+        *(f"{change[name]:.4f}" for name in ("random", "sobol", "whole", "retained")),
         f"{change['retained'] / change['random']:.2f}",
     ]
 

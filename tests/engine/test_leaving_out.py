@@ -91,7 +91,7 @@ def test_the_plan_of_a_frame_says_which_lights_have_no_map(renderer):
 def test_without_vpls_nothing_is_cast_shared_or_filtered(renderer, graph):
     one = renderer(SIZE, graph)
     image = one.render(room(), vpls=0)
-    assert one._tracer is None or graph == "mapped"
+    assert one._tracer is None or graph in ("mapped", "incremental")  # which trace direct light
     plan = one.plan(room(), 0)
     assert not {"light_shares", "gather", "near_field", "neighbours", "light_lonely_pixels"} & {
         step.name for step in plan.steps

@@ -74,7 +74,6 @@ def test_a_still_frame_runs_nothing(renderer, graph):
         ("deferred", ROOM, {"time": 1.0}, set()),
         ("forward", CAMERA, {}, {"visible_faces", "forward", "tonemap"}),
         ("interleaved", CAMERA, {}, {"gbuffer", "light_shares", "neighbours", "gather", "lighting", "tonemap"}),
-        ("incremental", CAMERA, {}, {"gbuffer", "light_shares", "neighbours", "gather", "lighting", "tonemap"}),
     ],
 )
 def test_only_what_depends_on_a_change_runs(renderer, graph, scene, options, ran):
@@ -220,6 +219,14 @@ def changes():
     yield build(plane()), {}, {**SETTINGS, "vpl.count": 12}
     yield light(emission=(0.0, 0.0, 0.0)), {}, SETTINGS
     yield ROOM, {}, SETTINGS
+
+
+@pytest.mark.parametrize(("visibility", "rays"), [("maps", set()), ("rays", {"direct_rays", "shadow_maps"})])
+def test_a_camera_that_moves_keeps_vpls(renderer, visibility, rays):
+    one = settled(renderer(SIZE, "incremental", set=SETTINGS | {"direct_rays.visibility": visibility}, reuse=True))
+    seen = {"gbuffer", "sample_pixels", "light_shares", "neighbours", "gather", "lighting", "tonemap"}
+    assert drawn(one, CAMERA) == seen | rays
+    assert one.executor.counters["maps_drawn"] == 0
 
 
 @pytest.mark.parametrize("graph", [*GRAPHS[:-1], "mapped by rays"])

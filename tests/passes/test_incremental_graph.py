@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from shadow_atlas import read_atlas, read_vpl_maps
-from small_scenes import build, plane, room
+from small_scenes import build, plane, room, sphere
 
 from deferred_ir.base.errors import GraphError
 from deferred_ir.cli import main
@@ -16,7 +16,8 @@ from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 
 SIZE = (48, 32)
 ROOM = room()
-SETTINGS = {"vpl.count": 24, "shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}
+MAPS = {"direct_rays.visibility": "maps"}
+SETTINGS = {"vpl.count": 24, "shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32, **MAPS}
 
 
 def moved(scene, step):
@@ -48,7 +49,7 @@ def test_kept_maps_hold_what_maps_drawn_anew_hold(renderer, projection, layer_fr
 
 def test_tiles_of_every_block_of_lights_are_kept(renderer):
     count = VPLS_PER_BLOCK + 40
-    settings = {"vpl.count": count, "vpl.most": count, "shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 16}
+    settings = {"vpl.count": count, "vpl.most": count, "shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 16, **MAPS}
     one = renderer(SIZE, "incremental", set=settings)
     plan = one.plan(ROOM)
     one.draw(ROOM, plan)
@@ -136,7 +137,8 @@ def test_a_least_above_the_most_is_one_line(renderer):
 def test_a_run_tells_which_maps_it_kept(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     command = "render cornell --graph incremental --size 32x32 --vpls 16 --frames 3 --device software"
-    settings = ["--set", "shadow_maps.spot_size=64", "--set", "shadow_maps.vpl_size=16"]
+    given = ("shadow_maps.spot_size=64", "shadow_maps.vpl_size=16", "direct_rays.visibility=maps")
+    settings = [word for each in given for word in ("--set", each)]
     assert main.main([*command.split(), *settings, "--json", "run.json", "-o", "a_%04d.npy"]) == 0
     assert main.main([*command.split(), *settings, "-o", "b_%04d.npy"]) == 0
     run = json.loads((tmp_path / "run.json").read_text())
@@ -149,3 +151,33 @@ def test_a_run_tells_which_maps_it_kept(tmp_path, monkeypatch):
     assert len({(part["layer"], part["tile"]) for part in parts}) == len(parts)
     for frame in range(3):
         np.testing.assert_array_equal(*(np.load(f"{name}_{frame:04d}.npy") for name in "ab"))
+
+
+def test_direct_light_comes_from_a_map_or_from_rays(renderer):
+    """The same but for the edges of shadows; with rays the spotlight has no map."""
+    images = []
+    for visibility in ("maps", "rays"):
+        one = renderer((96, 64), "incremental", set={**SETTINGS, "direct_rays.visibility": visibility})
+        images.append(one.render(ROOM).radiance)
+        step = next(step for step in one.plan(ROOM).steps if step.name == "shadow_maps")
+        parts = step.work.subpasses(step.descriptions, one.executor.state("shadow_maps"))
+        assert (parts[0]["light"] == "spotlight") == (visibility == "maps")
+        assert one.executor.counters["maps_drawn"] == len(parts) == 8 + (visibility == "maps")
+    differ = np.abs(images[0] - images[1]).max(axis=-1) > 0.01 * images[0].mean()
+    assert 0 < differ.mean() < 0.04
+
+
+@pytest.mark.parametrize(
+    ("scene", "size", "rays"),
+    [
+        (ROOM, (64, 64), True),
+        (ROOM, (512, 512), False),
+        (replace(ROOM, spotlight=replace(ROOM.spotlight, radius=0.1)), (96, 64), False),
+        (build(sphere(1.0, 6), plane(9.0, -1.0)), (512, 512), True),
+    ],
+    ids=["few pixels", "many pixels", "a disc", "many triangles"],
+)
+def test_direct_light_comes_from_what_should_take_less_time(renderer, scene, size, rays):
+    one = renderer(size, "incremental")
+    assert ("direct_rays" in {step.name for step in one.plan(scene).steps}) == rays
+    assert "direct_rays" in {step.name for step in renderer(size, "resampled").plan(scene).steps}

@@ -18,4 +18,6 @@ def test_it_prints_its_tables(monkeypatch, capsys):
     assert len(times) == len(measured.TIMES)
     assert len(errors) == len(measured.ERRORS)
     assert int(times[-1].strip("| ")) <= 9
-    assert all(float(cell.strip("| ")) > 0 for row in rows for cell in row[1:])
+    maps = times[-2:]  # none where the light is traced and few VPLs come and go
+    assert all(float(cell.strip("| ")) >= 0 for cell in maps)
+    assert all(float(cell.strip("| ")) > 0 for row in (times[:-2], lag, errors) for cell in row[1:])

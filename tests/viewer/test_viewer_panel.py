@@ -135,7 +135,7 @@ def depths(viewer, tile):
 def test_no_word_of_the_panel_is_clipped(tall):
     """With all parts open, in the graph with the most parameters."""
     viewer = tall
-    viewer.session.choose("mapped")
+    viewer.session.choose("accurate")
     viewer.session.adjust("vpl.count", 4)
     viewer.controls.switches["map"] = True
     arrange(viewer, *PARTS)

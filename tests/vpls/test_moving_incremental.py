@@ -21,7 +21,7 @@ from deferred_ir.vpls.incremental import FARTHEST, IncrementalVpls
 from deferred_ir.vpls.stale_maps import StaleMaps
 
 SIZE = (48, 32)
-SETTINGS = {"vpl.count": 24, "shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32}
+SETTINGS = {"vpl.count": 24, "shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 32, "direct_rays.visibility": "maps"}
 LIGHT = Spotlight((-0.4, 0.9, 0.3), (0.1, -1.0, -0.1), 110.0, (3.0, 2.5, 2.0))
 STILL = (0.0, 0.0, 0.0, 1.0)
 SCENE = room_with_moving_models()

@@ -92,7 +92,7 @@ def test_skipped_passes_are_marked(viewer):
     [
         ("deferred", {}),
         ("forward", {}),
-        ("incremental", {}),
+        ("incremental", {"direct_rays.visibility": "maps"}),
         ("hemisphere", {}),
         ("forward", {"shadow_maps.projection": "paraboloid"}),
     ],
@@ -135,7 +135,7 @@ def depths(viewer, tile):
 def test_no_word_of_the_panel_is_clipped(tall):
     """With all parts open, in the graph with the most parameters."""
     viewer = tall
-    viewer.session.choose("accurate")
+    viewer.session.choose("mapped")
     viewer.session.adjust("vpl.count", 4)
     viewer.controls.switches["map"] = True
     arrange(viewer, *PARTS)

@@ -90,7 +90,7 @@ class ShadowMapsPanel:
         chosen = maps[min(self.light, most)]
         label = f"{chosen.light}, {chosen.state}" if chosen.state else chosen.light
         _, self.light = imgui.slider_int("light", min(self.light, most), 0, most, label)
-        imgui.set_item_tooltip("0 is the spotlight; the VPLs follow by the tiles of their maps")
+        imgui.set_item_tooltip("the spotlight's, unless rays replace it; the VPLs follow by the tiles of their maps")
         _, self.intensity = imgui.slider_float(
             "intensity", self.intensity, 0.01, 100.0, "%.3g", imgui.SliderFlags_.logarithmic
         )

@@ -6,7 +6,7 @@ from __future__ import annotations
 def estimate_direct_ray_cost(pixels: int, samples: int) -> float:
     """Return milliseconds for `samples` shadow rays to the spotlight from each pixel.
 
-    Measured with two cores. It counts none: the number of cores must not choose between ways that differ in pixels.
+    Measured with two cores, and taken for any number: cores must not choose between ways that differ in pixels.
     """
     return 1e-4 * pixels * samples
 

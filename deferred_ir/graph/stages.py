@@ -13,7 +13,7 @@ from deferred_ir.graph.pass_base import Pass
 
 Stage = Literal["auto", "fragment", "compute"]
 SUFFIXES = {"fragment": ".frag", "compute": ".comp"}
-"""Of the shader files of each stage."""
+"""Suffix of the shader files of each stage."""
 DOC = (
     "Kind of shaders; `auto`: `compute` where `doctor --calibrate` found it faster on this machine, with equal pixels."
 )

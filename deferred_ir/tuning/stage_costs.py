@@ -1,4 +1,4 @@
-"""Which passes run faster in compute shaders on this machine: measured, and kept in the user's cache folder.
+"""Keeps in the user's cache folder which passes run faster in compute shaders on this machine.
 
 An image must not depend on what was measured, so that only passes count that have given the same bits either way.
 """

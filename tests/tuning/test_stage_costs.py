@@ -1,4 +1,4 @@
-"""Which passes run faster in compute shaders: kept in the cache folder, and believed only where bits were equal."""
+"""Trials of compute shaders are kept in the cache folder, and believed only where bits were equal."""
 
 import pytest
 

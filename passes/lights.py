@@ -47,7 +47,7 @@ class Lights(Pass):
 
 def _list_cones(scene: Scene) -> np.ndarray:
     """Return the pyramids about what the lights' views cover, AXES (m,)."""
-    views = [view for light in scene.lights for view in light.list_views()]
+    views = [view for light in scene.direct_lights for view in light.list_views(scene.bounds)]
     cones = np.zeros(len(views), AXES)
     for cone, view in zip(cones, views, strict=True):
         cone["position"] = view.position

@@ -80,7 +80,7 @@ class Vpl(Pass):
     def _cast(self, frame: Frame) -> Vpls:
         """The VPLs of a frame; with candidates, `count` of them, or more where further bounces bring more."""
         p, tracer, seed = self.params, frame.tracer(), frame.seed
-        vpls = cast(frame.scene.spotlight, tracer, p.count * p.candidates, p.pattern, seed, bounces=p.bounces)
+        vpls = cast(frame.scene.emitters, tracer, p.count * p.candidates, p.pattern, seed, bounces=p.bounces)
         count = max(p.count, -(-len(vpls) // p.candidates))
         if len(vpls) <= count:
             return vpls

@@ -88,7 +88,7 @@ class VplPool(Pass):
         p = self.params
         vpls = NONE
         if p.count > 0 and frame.scene.emits:
-            vpls = cast(frame.scene.spotlight, frame.tracer(), p.pool, p.pattern, frame.seed, bounces=p.bounces)
+            vpls = cast(frame.scene.emitters, frame.tracer(), p.pool, p.pattern, frame.seed, bounces=p.bounces)
         records = pack_vpls(frame.scene, vpls, p, np.zeros(len(vpls), int))
         records = records[order_along_curve(records["position"], records["z_axis"])]
         io["vpls"].write(records)

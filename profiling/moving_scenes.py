@@ -8,8 +8,9 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.scene.geometry import Geometry, Model
+from deferred_ir.scene.materials import Material
 from deferred_ir.scene.motion import LissajousMotion, ModelMotion
-from deferred_ir.scene.scene import Material, Scene
+from deferred_ir.scene.scene import Scene
 
 BALL = 0.06
 """Radius of the moving ball, in diagonals of the scene."""
@@ -22,12 +23,12 @@ def move_light(scene: Scene) -> Scene:
         return scene
     x, y, z = (fraction * scene.geometry.diagonal for fraction in (0.05, 0.01, 0.05))
     start = light.position[0] - x, light.position[1] - y, light.position[2]  # so it is in its place at time 0
-    return replace(scene, spotlight=replace(light, position=start, motion=LissajousMotion((x, y, z), (0.8, 0.5))))
+    return replace(scene, lights=(replace(light, position=start, motion=LissajousMotion((x, y, z), (0.8, 0.5))),))
 
 
 def hold_light(scene: Scene) -> Scene:
     """Let the light stay where it is at time 0."""
-    return replace(scene, spotlight=replace(scene.spotlight.at(0), motion=None))
+    return replace(scene, lights=(replace(scene.spotlight.at(0), motion=None),))
 
 
 def add_moving_ball(scene: Scene) -> Scene:

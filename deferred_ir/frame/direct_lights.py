@@ -35,9 +35,9 @@ def describe_output() -> Output:
 
 def pack_lights(scene: Scene) -> np.ndarray:
     """Return LIGHT records (n,) of the scene's lights."""
-    records, owners = np.zeros(len(scene.lights), LIGHT), find_view_owners(scene)
+    records, owners = np.zeros(len(scene.direct_lights), LIGHT), find_view_owners(scene)
     records["view"] = np.searchsorted(owners, np.arange(len(records)))
-    for record, light in zip(records, scene.lights, strict=True):
+    for record, light in zip(records, scene.direct_lights, strict=True):
         for name, value in light.describe().items():
             record[name] = value
     return records
@@ -45,7 +45,9 @@ def pack_lights(scene: Scene) -> np.ndarray:
 
 def find_view_owners(scene: Scene) -> Ints:
     """Return for each view of the scene's lights the number of its light, ascending, int (views,)."""
-    return np.repeat(np.arange(len(scene.lights)), [len(light.list_views()) for light in scene.lights])
+    return np.repeat(
+        np.arange(len(scene.direct_lights)), [len(light.list_views(scene.bounds)) for light in scene.direct_lights]
+    )
 
 
 class LightVersions:

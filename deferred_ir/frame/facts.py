@@ -14,7 +14,13 @@ SOFTWARE = Fact("software", unknown=True, doc="OpenGL draws on the CPU.")
 
 def collect_facts(scene: Scene, size: tuple[int, int] | None = None, *, software: bool | None = None) -> Facts:
     """Return what planning may know of `scene` and, where they are given, of the frame's size and the device."""
-    facts = Facts({EMITS: scene.emits, SOFT: scene.spotlight.has_area, TRIANGLES: len(scene.geometry.faces)})
+    facts = Facts(
+        {
+            EMITS: scene.emits,
+            SOFT: any(light.has_area for light in scene.direct_lights),
+            TRIANGLES: len(scene.geometry.faces),
+        }
+    )
     if size is not None:
         facts = facts.add({PIXELS: size[0] * size[1]})
     return facts if software is None else facts.add({SOFTWARE: software})

@@ -13,7 +13,7 @@ from deferred_ir.frame.vpl_params import VplParams
 from deferred_ir.graph.ports import Buffer, Output
 from deferred_ir.sampling.warps import build_basis
 from deferred_ir.scene.geometry import Geometry
-from deferred_ir.scene.lights.spot import one_minus_cos
+from deferred_ir.scene.lights.spotlight import one_minus_cos
 from deferred_ir.scene.scene import Scene
 from deferred_ir.vpls.cast import Vpls
 from deferred_ir.vpls.kernel import VplLimits

@@ -1,4 +1,4 @@
-"""Chooses a camera or a spotlight for a scene without one.
+"""Chooses a camera for a scene without one, and a spotlight for a scene without any light.
 
 Inside and looking across where rays from the middle meet surfaces nearly all around, else from outside. The light's E
 makes the mean direct irradiance of what the camera sees 1. Everything is deterministic; +y is up.
@@ -14,7 +14,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.base.errors import DeviceError
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
 
@@ -40,9 +40,11 @@ def choose_views(scene: Scene, camera: bool, spotlight: bool) -> Scene:
         return scene
     near, reasons = _choose_by_rays(recentre(scene.at(0)), camera, spotlight)
     by = scene.geometry.centre
-    views: dict[str, Any] = {"camera": near.camera, "spotlight": near.spotlight}
+    views: dict[str, Any] = {"camera": near.camera, "spotlight": near.lights[0] if spotlight else None}
     views = {name: views[name].translate(by) if any(by) else views[name] for name in reasons}
-    return replace(scene, **views, chosen={name: _describe(views[name], why) for name, why in reasons.items()})
+    lights = (views["spotlight"],) if spotlight else scene.lights
+    chosen = {name: _describe(views[name], why) for name, why in reasons.items()}
+    return replace(scene, camera=views.get("camera", scene.camera), lights=lights, chosen=chosen)
 
 
 def _choose_by_rays(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scene, dict[str, str]]:
@@ -62,7 +64,7 @@ def _choose_by_rays(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scene,
     if spotlight:
         lights = [_make_outside_light(scene)] if middle is None else _make_room_lights(tracer, scene.camera, middle)
         light, reasons["spotlight"] = _choose_light(tracer, scene.camera, lights)
-        scene = replace(scene, spotlight=light)
+        scene = replace(scene, lights=(light,))
     return scene, reasons
 
 
@@ -74,7 +76,7 @@ def _choose_by_bounds(scene: Scene, camera: bool, spotlight: bool) -> tuple[Scen
         scene = replace(scene, camera=_make_outside_camera(scene))
     if spotlight:
         reasons["spotlight"] = "irradiance of 1 at the middle: without embreex no rays tell what is lit"
-        scene = replace(scene, spotlight=_set_emission(_make_outside_light(scene), _square_light_distance(scene)))
+        scene = replace(scene, lights=(_set_emission(_make_outside_light(scene), _square_light_distance(scene)),))
     return scene, reasons
 
 

@@ -11,12 +11,10 @@ from deferred_ir.loading import default_views, merge, models, scene_file
 from deferred_ir.loading.model_data import ModelData
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
 from deferred_ir.scene.scene import Scene
 
 ANY_CAMERA = Camera((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
-ANY_LIGHT = Spotlight((0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
-"""Placeholders until default_views has chosen."""
+"""A placeholder until default_views has chosen."""
 
 
 def builtin_scenes() -> tuple[tuple[str, str], ...]:
@@ -46,11 +44,12 @@ def load(scene: str | os.PathLike[str]) -> Scene:
         textures=textures,
         models=ranges,
         camera=described.camera or ANY_CAMERA,
-        spotlight=described.spotlight or ANY_LIGHT,
+        lights=described.lights,
         render=described.render,
         notes=notes,
     )
-    return default_views.choose_views(result, camera=described.camera is None, spotlight=described.spotlight is None)
+    dark = not described.lights and result.surface_light is None
+    return default_views.choose_views(result, camera=described.camera is None, spotlight=dark)
 
 
 def _read_model(entry: ModelEntry, path: Path, index: int, count: int) -> ModelData:

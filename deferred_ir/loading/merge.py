@@ -10,8 +10,8 @@ from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading.model_data import ModelData, Part
 from deferred_ir.scene.geometry import Geometry, Model
+from deferred_ir.scene.materials import Material, Texture
 from deferred_ir.scene.motion import ModelMotion
-from deferred_ir.scene.scene import Material, Texture
 
 
 def merge(

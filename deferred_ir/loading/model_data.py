@@ -10,7 +10,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints, Vec3
 from deferred_ir.base.errors import SceneError
-from deferred_ir.scene.scene import Material, Texture
+from deferred_ir.scene.materials import Material, Texture
 
 GREY = (0.8, 0.8, 0.8)
 """Albedo of a surface for which the file gives none."""

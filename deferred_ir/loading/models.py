@@ -18,7 +18,7 @@ from deferred_ir.loading.formats.model_format import WHITE, ModelFormat
 from deferred_ir.loading.formats.obj import ObjFormat
 from deferred_ir.loading.model_data import ModelData, Part
 from deferred_ir.loading.textures import decode_texture
-from deferred_ir.scene.scene import Material, Texture
+from deferred_ir.scene.materials import Material, Texture
 
 ARCHIVES = ("zip", "gz", "bz2")
 """Archives are refused: trimesh unpacks them without a bound and reads their files without our corrections."""

@@ -12,22 +12,15 @@ from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.arrays import Vec3
-from deferred_ir.base.errors import SceneError, did_you_mean, format_value
+from deferred_ir.base.errors import SceneError, format_value
 from deferred_ir.base.image_size import parse_size
 from deferred_ir.base.toml_tables import Faults, Table, read_toml
-from deferred_ir.scene.camera import Camera, find_view_fault
-from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.motion import (
-    CameraMotion,
-    KeyframedSpotlight,
-    LissajousMotion,
-    ModelMotion,
-    SpotlightMotion,
-    ViewKeyframes,
-)
+from deferred_ir.loading.light_tables import check_view, read_keyframes, read_lights
+from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.base import Light
+from deferred_ir.scene.motion import CameraMotion, ModelMotion
 from deferred_ir.scene.scene import RenderDefaults
 
-KINDS = ("lissajous", "keyframes")
 NAME = re.compile(r"[^/\\%\x00-\x1f\x7f]{1,100}")
 
 
@@ -43,12 +36,12 @@ class ModelEntry:
 
 @dataclass(frozen=True)
 class SceneFile:
-    """The contents of a scene file; camera and spotlight are None where it leaves them out."""
+    """The contents of a scene file; camera is None where it leaves that out. lights: a [spotlight] first."""
 
     name: str
     models: tuple[ModelEntry, ...]
     camera: Camera | None = None
-    spotlight: Spotlight | None = None
+    lights: tuple[Light, ...] = ()
     render: RenderDefaults = field(default_factory=RenderDefaults)
 
 
@@ -56,17 +49,18 @@ def read(path: Path) -> SceneFile:
     """Read and check a scene file. Raises SceneError: one line with all faults, each with its key and the mend."""
     faults = Faults(str(path))
     data = read_toml(path, str(path), SceneError)
-    root = Table(faults, "", data, ("name", "model", "camera", "spotlight", "render"))
+    root = Table(faults, "", data, ("name", "model", "camera", "spotlight", "light", "render"))
     name = root.string("name")
     if name and not NAME.fullmatch(name):
         root.fault(
             "name", f"{format_value(name)}: names pictures; leave slashes, percent and control characters out of it"
         )
     models = _read_models(root, path.parent)
-    camera, spotlight, render = _read_camera(root), _read_spotlight(root), _read_render(root, path.parent)
+    camera, lights = _read_camera(root), read_lights(root, path.parent)
+    render = _read_render(root, path.parent)
     if faults.found:
         faults.fail()
-    return SceneFile(name or path.stem, models, camera, spotlight, render)
+    return SceneFile(name or path.stem, models, camera, lights, render)
 
 
 def _read_models(root: Table, folder: Path) -> tuple[ModelEntry, ...]:
@@ -120,69 +114,18 @@ def _read_camera(root: Table) -> Camera | None:
     motion = _read_camera_motion(table, up)
     if position is None or look_at is None:
         return None
-    _check_view(table, "look_at", position, look_at, up)
+    check_view(table, "look_at", position, look_at, up)
     return Camera(position, look_at, up, fov, motion)
 
 
 def _read_camera_motion(camera: Table, up: Vec3) -> CameraMotion | None:
     table = camera.table("motion", ("times", "positions", "look_ats"))
-    path = _read_keyframes(table) if table else None
+    path = read_keyframes(table) if table else None
     if table is None or path is None:
         return None
     for index, (position, look_at) in enumerate(zip(path.positions, path.look_ats, strict=True)):
-        _check_view(table, f"look_ats[{index}]", position, look_at, up)
+        check_view(table, f"look_ats[{index}]", position, look_at, up)
     return CameraMotion(path.times, path.positions, path.look_ats)
-
-
-def _read_spotlight(root: Table) -> Spotlight | None:
-    table = root.table("spotlight", ("position", "look_at", "fov", "emission", "radius", "motion"))
-    if table is None:
-        return None
-    position, look_at, emission = table.vec3("position"), table.vec3("look_at"), table.vec3("emission")
-    fov, radius = _read_fov(table, Spotlight.fov), table.number("radius", 0.0)
-    if emission is not None and min(emission) < 0:
-        table.fault("emission", f"must be 0 or more, not {format_value(list(emission))}")
-    if radius < 0:
-        table.fault("radius", f"must be 0 or more, not {radius}")
-    motion = _read_spotlight_motion(table)
-    if position is None or look_at is None or emission is None:
-        return None
-    light = Spotlight(position, look_at, fov, emission, radius, motion)
-    # Around a Lissajous figure's middle the light may well look at that.
-    _check_view(table, "look_at", light.at(0.0).position, light.at(0.0).look_at)
-    return light
-
-
-def _read_spotlight_motion(spotlight: Table) -> SpotlightMotion | None:
-    table = spotlight.table("motion", ("kind", "amplitude", "speed", "times", "positions", "look_ats"))
-    kind = table.string("kind", needed=True, mend=f"one of {', '.join(KINDS)}") if table else None
-    if table is None or kind is None:
-        return None
-    own = {"lissajous": ("amplitude", "speed"), "keyframes": ("times", "positions", "look_ats")}
-    if kind not in own:
-        table.fault("kind", f"unknown motion {format_value(kind)}{did_you_mean(kind, KINDS)}")
-        return None
-    for key in table.data:
-        if key != "kind" and key not in own[kind] and any(key in keys for keys in own.values()):
-            table.fault(key, f'does not belong to kind = "{kind}"; take it away')
-    if kind == "lissajous":
-        amplitude, speed = table.vec3("amplitude"), table.vector("speed", 2)
-        return LissajousMotion(amplitude, (speed[0], speed[1])) if amplitude and speed else None
-    path = _read_keyframes(table)
-    if path is None:
-        return None
-    for index, (position, look_at) in enumerate(zip(path.positions, path.look_ats, strict=True)):
-        _check_view(table, f"look_ats[{index}]", position, look_at)
-    return KeyframedSpotlight(path.times, path.positions, path.look_ats)
-
-
-def _read_keyframes(table: Table) -> ViewKeyframes | None:
-    """Read times, positions and look_ats of a camera or a spotlight."""
-    times = table.times()
-    positions, look_ats = table.vec3s("positions", times), table.vec3s("look_ats", times)
-    if times is None or positions is None or look_ats is None:
-        return None
-    return ViewKeyframes(times, positions, look_ats)
 
 
 def _read_fov(table: Table, default: float) -> float:
@@ -191,14 +134,6 @@ def _read_fov(table: Table, default: float) -> float:
         table.fault("fov", f"must lie between 0 and 180 degrees, not {fov}")
         return default
     return fov
-
-
-def _check_view(table: Table, key: str, position: Vec3, look_at: Vec3, up: Vec3 | None = None) -> None:
-    """Note a fault if the view has no direction, or `up` lies along it. key: that of look_at."""
-    fault = find_view_fault(position, look_at, up)
-    if fault:
-        name, why = fault
-        table.fault(key if "[" in key or name == "look_at" else name, why)
 
 
 def _read_render(root: Table, folder: Path) -> RenderDefaults:

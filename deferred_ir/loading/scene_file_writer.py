@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.files import write_whole
+from deferred_ir.loading.light_tables import SPOTLIGHT
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.motion import LissajousMotion, ModelMotion, SpotlightMotion, ViewKeyframes
+from deferred_ir.scene.environment_image import EnvironmentImage
+from deferred_ir.scene.lights.base import Light
+from deferred_ir.scene.motion import LightMotion, LissajousMotion, ModelMotion, ViewKeyframes
 from deferred_ir.scene.scene import RenderDefaults
 
 
@@ -37,11 +40,13 @@ def write_toml(path: Path, tables: Mapping[str, Any], comment: str = "") -> None
 
 def make_tables(scene: SceneFile) -> dict[str, Any]:
     """Build the tables of a scene file, without those that are None."""
+    first = int(bool(scene.lights) and scene.lights[0].kind == SPOTLIGHT)
     tables = {
         "name": scene.name,
         "model": [_make_model(entry) for entry in scene.models],
         "camera": _make_camera(scene.camera) if scene.camera else None,
-        "spotlight": _make_spotlight(scene.spotlight) if scene.spotlight else None,
+        "spotlight": _make_light(scene.lights[0]) if first else None,
+        "light": [{"kind": light.kind, **_make_light(light)} for light in scene.lights[first:]] or None,
         "render": _make_render(scene.render) or None,
     }
     return {key: table for key, table in tables.items() if table is not None}
@@ -74,31 +79,31 @@ def _make_camera(camera: Camera) -> dict[str, Any]:
     return table
 
 
-def _make_spotlight(light: Spotlight) -> dict[str, Any]:
-    table: dict[str, Any] = {
-        "position": list(light.position),
-        "look_at": list(light.look_at),
-        "fov": light.fov,
-        "emission": list(light.emission),
-        "radius": light.radius,
-    }
-    if light.motion:
-        table["motion"] = _make_spotlight_motion(light.motion)
+def _make_light(light: Light) -> dict[str, Any]:
+    """Build the table of a light: the fields of its class."""
+    table: dict[str, Any] = {}
+    for field in fields(light):  # type: ignore[arg-type]  # every kind is a dataclass
+        value = getattr(light, field.name)
+        if value is None:
+            continue
+        if field.name == "motion":
+            table["motion"] = _make_light_motion(value)
+        elif isinstance(value, EnvironmentImage):
+            table[field.name] = value.name
+        else:
+            table[field.name] = list(value) if isinstance(value, tuple) else value
     return table
 
 
-def _make_spotlight_motion(motion: SpotlightMotion) -> dict[str, Any]:
+def _make_light_motion(motion: LightMotion) -> dict[str, Any]:
     if isinstance(motion, LissajousMotion):
         return {"kind": "lissajous", "amplitude": list(motion.amplitude), "speed": list(motion.speed)}
     return {"kind": "keyframes", **_make_keyframes(motion)}
 
 
 def _make_keyframes(path: ViewKeyframes) -> dict[str, Any]:
-    return {
-        "times": list(path.times),
-        "positions": [list(point) for point in path.positions],
-        "look_ats": [list(point) for point in path.look_ats],
-    }
+    aims = {"look_ats": [list(point) for point in path.look_ats]} if path.look_ats else {}
+    return {"times": list(path.times), "positions": [list(point) for point in path.positions], **aims}
 
 
 def _make_render(defaults: RenderDefaults) -> dict[str, Any]:

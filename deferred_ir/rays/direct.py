@@ -20,13 +20,24 @@ PIXELS = 1 << 13
 GOLDEN_ANGLE = np.pi * (3 - 5**0.5)
 
 
-def compute_irradiance(light: Light, tracer: Tracer, at: Hits, rng: np.random.Generator) -> Array:
-    """Return the irradiance on surfaces `at` (n, all hit) divided by the light's emission, float64 (n,).
+class AllLight:
+    """The direct light of everything that shines, sampled at one random point of what has an area.
 
-    A light that has an area is sampled at one random point for each surface.
+    unit: linear RGB (3,) that its irradiance is relative to: the emission of an only light, else 1.
     """
-    points = square_to_disc(rng.random((len(at.face), 2))) if light.has_area else None
-    return _irradiate(light, tracer, at, points)
+
+    def __init__(self, tracer: Tracer) -> None:
+        self._tracer, self._lights = tracer, tracer.scene.emitters
+        self.unit = np.asarray(self._lights[0].emission if len(self._lights) == 1 else (1.0, 1.0, 1.0), float)
+
+    def irradiate(self, at: Hits, rng: np.random.Generator) -> Array:
+        """Return the irradiance on surfaces `at` (n, all hit) over `unit`, float64 (n, 3) or (n, 1)."""
+        total: Array = np.zeros((len(at.face), 1))
+        for light in self._lights:
+            places = square_to_disc(rng.random((len(at.face), 2))) if light.has_area else None
+            arriving = irradiate(light, self._tracer, at, places)
+            total = total + arriving * (np.asarray(light.emission) / self.unit) if len(self._lights) > 1 else arriving
+        return total
 
 
 def trace_spotlight(job: PixelJob, *, samples: int) -> Array:
@@ -47,11 +58,11 @@ def trace_spotlight(job: PixelJob, *, samples: int) -> Array:
         number, rows = task
         at = seen.rows(rows)
         if not light.has_area:
-            return _irradiate(light, tracer, at, None)
+            return irradiate(light, tracer, at, None)[:, 0]
         places = pixel_blocks.jitter(index[rows, 0], grid, streams.shadow_rays(seed, number)) + shift
         total = np.zeros(len(at.pixel))
         for i in range(samples):
-            total += _irradiate(light, tracer, at, _spiral(places % 1, i, samples))
+            total += irradiate(light, tracer, at, _spiral(places % 1, i, samples))[:, 0]
         return total / samples
 
     with closing(run_in_order(work, tasks, job.threads)) as results:
@@ -71,18 +82,18 @@ def _spiral(places: Array, i: int, count: int) -> Array:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
-def _irradiate(light: Light, tracer: Tracer, at: Hits | Surfaces, points: Array | None) -> Array:
-    """Return irradiance over emission on n surfaces, float64 (n,); points: on the unit disc of a disc light, (n, 2)."""
-    source = light.locate(points, len(at.position))
-    to = source - at.position
-    square = np.maximum(_dot(to, to), np.finfo(float).tiny)
-    to /= np.sqrt(square)[:, None]
-    facing = _dot(to, at.normal) > 0
-    strength = np.maximum(_dot(to, at.shading_normal), 0) * facing
-    strength *= light.radiate(-to) / square
-    lit = np.flatnonzero(strength)
+def irradiate(light: Light, tracer: Tracer, at: Hits | Surfaces, places: Array | None) -> Array:
+    """Return irradiance over emission on n surfaces, shadows included, float64 (n, 1), or (n, 3) if its colours vary.
+
+    places: of the unit disc, (n, 2), for a light that has an area.
+    """
+    found = light.sample(at.position, places, tracer.scene.bounds)
+    facing = _dot(found.to, at.normal) > 0
+    cosines = np.maximum(_dot(found.to, at.shading_normal), 0) * facing
+    strength: Array = cosines[:, None] * (found.strength if found.strength.ndim > 1 else found.strength[:, None])
+    lit = np.flatnonzero(strength.any(axis=1))
     starts = tracer.lift(at.position[lit], at.normal[lit])
-    strength[lit[tracer.occluded(starts, source[lit])]] = 0
+    strength[lit[tracer.occluded(starts, found.ends[lit])]] = 0
     return strength
 
 

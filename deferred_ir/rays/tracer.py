@@ -18,8 +18,8 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.rays.embree import INFINITE, EmbreeScenes
-from deferred_ir.scene.albedo import look_up_albedo
 from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.surface_colours import look_up_albedo
 
 CHUNK = 1 << 15
 OFFSET = 1e-5
@@ -122,7 +122,8 @@ class Tracer:
             has = length > 1e-6
             smooth[has] = face_towards(blend[has] / length[has, None], facing[has])
         normal[hit], shading[hit] = facing, smooth
-        albedo[hit] = look_up_albedo(self.scene, face[hit], weights)
+        scene = self.scene
+        albedo[hit] = look_up_albedo(scene.geometry, scene.materials, scene.textures, face[hit], weights)
         return Hits(face, position, normal, shading, albedo)
 
     def occluded(self, origins: Array, targets: Array, *, lifted: bool = False) -> Bools:

@@ -40,7 +40,10 @@ def list_for_scene(scene: Scene) -> list[LeftOut]:
         (not scene.textures, LeftOut("textures", "the scene has none", bytes=8 * vertices)),
         (textured == {True}, LeftOut("faces without a texture", "the scene has none")),
         (len(scene.materials) == 1, LeftOut("a material for each face", "the scene has one")),
-        (not any(light.has_area for light in scene.lights), LeftOut("soft shadows", "the spotlight's radius is 0")),
+        (
+            not any(light.has_area for light in scene.direct_lights),
+            LeftOut("soft shadows", "the spotlight's radius is 0"),
+        ),
     ]
     return [entry for absent, entry in found if absent]
 

@@ -14,11 +14,11 @@ import numpy as np
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.frame.vpl_params import CLAMP, CLAMP_RETURNED, CONE, VPLS
 from deferred_ir.graph.graph import Plan
-from deferred_ir.rays.direct import compute_irradiance
+from deferred_ir.rays.direct import AllLight
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.sampling import streams
 from deferred_ir.sampling.warps import lift_to_hemisphere
-from deferred_ir.scene.lights.spot import one_minus_cos
+from deferred_ir.scene.lights.spotlight import one_minus_cos
 from deferred_ir.scene.scene import Scene
 
 GRID = 128
@@ -62,8 +62,8 @@ def estimate(
     above = np.flatnonzero((away * seen.normal[seen_at]).sum(axis=1) > 0)  # into its own face: nothing arrives
     found, hits = tracer.within(origins[above], away[above], np.inf)
     rays = above[found]
-    light = scene.spotlight
-    lit = np.multiply.outer(compute_irradiance(light, tracer, hits, rng), np.asarray(light.emission, float))
+    light = AllLight(tracer)
+    lit = light.irradiate(hits, rng) * light.unit
     weight = (lit * hits.albedo * seen.albedo[seen_at[rays]]) @ LUMINANCE
     total = weight.sum()
     if total <= 0:

@@ -24,6 +24,11 @@ def light_disc(seed: int) -> Stream:
     return np.random.default_rng([seed, 0])
 
 
+def dealing(seed: int) -> Stream:
+    """Return the stream that deals rays to lights."""
+    return np.random.default_rng([seed, 0, 3])
+
+
 def light_disc_pattern(seed: int) -> int:
     """Return the pattern's seed for points on the light's disc; that of the directions is `seed` itself."""
     return seed + 104729

@@ -37,3 +37,38 @@ def build_basis(axes: Array) -> tuple[Array, Array]:
     right[..., 0], right[..., 1], right[..., 2] = 1 + sign * x * x * a, sign * b, -sign * x
     up[..., 0], up[..., 1], up[..., 2] = b, sign + y * y * a, -y
     return right, up
+
+
+def disc_to_square(disc: Array) -> Array:
+    """Map points of the unit disc (n, 2) back to the unit square: the inverse of `square_to_disc`."""
+    x, y = disc[:, 0], disc[:, 1]
+    wide = np.abs(x) > np.abs(y)
+    radius = np.copysign(np.hypot(x, y), np.where(wide, x, y))
+    # The angle from the larger coordinate's axis, between -pi/4 and pi/4.
+    ratio = np.arctan2(np.where(wide, y, x) * np.sign(radius), np.abs(np.where(wide, x, y))) * (4 / np.pi)
+    a, b = np.where(wide, radius, radius * ratio), np.where(wide, radius * ratio, radius)
+    square: Array = np.clip(np.stack([a, b], axis=1) / 2 + 0.5, 0, 1)
+    return square
+
+
+def square_to_sphere(square: Array) -> Array:
+    """Map points of the unit square (n, 2) to the unit sphere (n, 3), preserving area and strata."""
+    return disc_to_sphere(square_to_disc(square))
+
+
+def disc_to_sphere(disc: Array) -> Array:
+    """Map points of the unit disc (n, 2) to the unit sphere (n, 3), preserving area (Lambert 1772)."""
+    return disc_to_cone(disc, np.array([0.0, 0.0, 1.0]), 2.0)
+
+
+def disc_to_cone(disc: Array, axis: Array, edge: float) -> Array:
+    """Map points of the unit disc (n, 2) to unit directions (n, 3) in a cone about unit `axis` (3,), preserving area.
+
+    edge: 1 - cos of the cone's half angle; 2 is the whole sphere.
+    """
+    square = (disc**2).sum(axis=1)
+    height = edge * square  # 1 - cos
+    part = disc * np.sqrt(np.maximum(edge * (2 - height), 0))[:, None]
+    right, up = build_basis(axis)
+    directions: Array = part[:, :1] * right + part[:, 1:] * up + (1 - height)[:, None] * axis
+    return directions

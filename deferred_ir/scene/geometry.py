@@ -12,7 +12,13 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints, Vec3
 from deferred_ir.scene.motion import ModelMotion
-from deferred_ir.scene.vertices import compute_face_normals, find_bounds, find_groups, transform_points
+from deferred_ir.scene.vertices import (
+    compute_face_areas,
+    compute_face_normals,
+    find_bounds,
+    find_groups,
+    transform_points,
+)
 
 FAR = 4.0
 """A scene whose middle is farther from the origin than this many times its `scale` gets a `centre` of its own."""
@@ -141,6 +147,11 @@ class Geometry:
     def face_normals(self) -> Array:
         """Unit geometric normals by winding, float64 (F, 3); +y for a degenerate face, which covers no pixel."""
         return compute_face_normals(self.positions, self.faces)
+
+    @cached_property
+    def face_areas(self) -> Array:
+        """Areas of the faces, float64 (F,); rigid motions keep them."""
+        return compute_face_areas(self.rest.positions, self.faces)
 
     @cached_property
     def bounds(self) -> Array:

@@ -41,8 +41,17 @@ class CameraMotion(ViewKeyframes):
     """Keyframes of a camera."""
 
 
-class KeyframedSpotlight(ViewKeyframes):
-    """Keyframes of a spotlight."""
+@dataclass(frozen=True)
+class KeyframedLight(ViewKeyframes):
+    """Keyframes of a light. Without look_ats, what it looks at stays; lights that shine all around have none."""
+
+    look_ats: tuple[Vec3, ...] = ()
+
+    def move(self, position: Vec3, look_at: Vec3, time: float) -> tuple[Vec3, Vec3]:
+        """Return position and look_at at `time`, from those of the light at rest."""
+        if self.look_ats:
+            return super().move(position, look_at, time)
+        return evaluate_spline(self.times, self.positions, time), look_at
 
 
 @dataclass(frozen=True)
@@ -64,7 +73,7 @@ class LissajousMotion:
         return moved, look_at
 
 
-SpotlightMotion = LissajousMotion | KeyframedSpotlight
+LightMotion = LissajousMotion | KeyframedLight
 
 
 @dataclass(frozen=True)

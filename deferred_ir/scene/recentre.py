@@ -19,7 +19,7 @@ _recentred: WeakKeyDictionary[Geometry, Geometry | None] = WeakKeyDictionary()
 def recentre(scene: Scene) -> Scene:
     """Return the scene in coordinates about `scene.geometry.centre`, without huge triangles; itself if it is so.
 
-    Camera and light rest where they are.
+    Camera and lights rest where they are.
     """
     geometry = recentre_geometry(scene.geometry)
     if geometry is scene.geometry:
@@ -30,7 +30,7 @@ def recentre(scene: Scene) -> Scene:
         scene,
         geometry=geometry,
         camera=scene.camera.translate(by),
-        spotlight=scene.spotlight.translate(by),
+        lights=tuple(light.translate(by) for light in scene.lights),
     )
 
 

@@ -1,4 +1,4 @@
-"""A scene: triangles, materials, a camera and one spotlight. `load` makes one from files.
+"""A scene: triangles, materials, a camera and lights. `load` makes one from files.
 
 All arrays are world space. Nothing here touches OpenGL.
 """
@@ -11,31 +11,18 @@ from functools import cached_property
 from math import isfinite
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from deferred_ir.base.errors import SceneError, SettingError
 from deferred_ir.scene.camera import Camera, find_view_fault
 from deferred_ir.scene.geometry import Geometry, Model
-from deferred_ir.scene.lights.base import Light
-from deferred_ir.scene.lights.spot import Spotlight
-
-
-@dataclass(frozen=True, eq=False)
-class Texture:
-    """An image texture. pixels: uint8 (H, W, 3), sRGB, top row first; v = 1 is the top edge; repeated in u and v."""
-
-    name: str
-    pixels: Any
-
-
-@dataclass(frozen=True)
-class Material:
-    """A Lambertian material: reflectance is albedo (linear RGB) times texture (index into Scene.textures), if any."""
-
-    name: str
-    albedo: tuple[float, float, float]
-    texture: int | None = None
+from deferred_ir.scene.lights.base import Bounds, DirectLight, Light, SampledLight, is_direct, is_sampled
+from deferred_ir.scene.lights.fields import LightError
+from deferred_ir.scene.lights.spotlight import Spotlight
+from deferred_ir.scene.materials import Material, Texture
+from deferred_ir.scene.surface_light import SurfaceLight, find_surface_light
 
 
 @dataclass(frozen=True)
@@ -51,7 +38,11 @@ class RenderDefaults:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A loaded scene. chosen: what the loader chose for lack of it in the files; notes: what it does not honour."""
+    """A loaded scene.
+
+    lights: all but emitting surfaces, which materials say. chosen: what the loader chose for lack of it in the files;
+    notes: what it does not honour.
+    """
 
     name: str
     path: Path
@@ -60,7 +51,7 @@ class Scene:
     textures: tuple[Texture, ...]
     models: tuple[Model, ...]
     camera: Camera
-    spotlight: Spotlight
+    lights: tuple[Light, ...]
     render: RenderDefaults = RenderDefaults()
     chosen: Mapping[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
@@ -77,23 +68,54 @@ class Scene:
         for texture in self.textures:
             digest.update(repr(texture.pixels.shape).encode() + np.ascontiguousarray(texture.pixels).tobytes())
         motions = tuple(model.motion for model in self.models)
-        digest.update(repr((self.materials, self.camera, self.spotlight, motions)).encode())
+        digest.update(repr((self.materials, self.camera, self.lights, motions)).encode())
         return digest.hexdigest()[:16]
 
+    @cached_property
+    def bounds(self) -> Bounds:
+        """A sphere about all surfaces wherever models move: what light from infinity enters."""
+        low, high = self.geometry.extent
+        x, y, z = ((low + high) / 2).tolist()
+        return Bounds((x, y, z), self.geometry.diagonal / 2)
+
     @property
-    def lights(self) -> tuple[Light, ...]:
-        """All direct lights."""
-        return (self.spotlight,)
+    def emitters(self) -> tuple[Light, ...]:
+        """Everything that shines: the lights that are on, then emitting surfaces as one light."""
+        surfaces = self.surface_light
+        return (*(light for light in self.lights if any(light.emission)), *([surfaces] if surfaces else []))
+
+    @property
+    def direct_lights(self) -> tuple[DirectLight, ...]:
+        """The lights that shaders evaluate, on or off."""
+        return tuple(light for light in self.lights if is_direct(light))
+
+    @property
+    def sampled_lights(self) -> tuple[SampledLight, ...]:
+        """The lights that points stand for, if they are on."""
+        return tuple(light for light in self.emitters if is_sampled(light))
+
+    @property
+    def spotlight(self) -> Spotlight:
+        """Its first light of that kind, on or off. Raises SceneError if it has none."""
+        found = next((light for light in self.lights if isinstance(light, Spotlight)), None)
+        if found is None:
+            raise SceneError(f"{self.path}: has no spotlight; add [spotlight]")
+        return found
+
+    @property
+    def surface_light(self) -> SurfaceLight | None:
+        """Its emitting surfaces as a light, None if there are none."""
+        return _find_surface_light(self.geometry, self.materials, self.textures)
 
     @property
     def emits(self) -> bool:
-        """Whether a light shines."""
-        return any(any(light.emission) for light in self.lights)
+        """Whether anything shines."""
+        return bool(self.emitters)
 
     @property
     def moves(self) -> bool:
-        """Whether camera, spotlight or a model has a motion."""
-        return bool(self.camera.motion or self.spotlight.motion or self.geometry.moves)
+        """Whether camera, a light or a model has a motion."""
+        return bool(self.camera.motion or any(light.motion for light in self.lights) or self.geometry.moves)
 
     def at(self, time: float) -> Scene:
         """Return the scene as it is at `time` seconds, without motion; itself where nothing moves.
@@ -104,16 +126,36 @@ class Scene:
         if not isfinite(time):
             raise SettingError(f"time {time}: must be finite, in seconds")
         geometry = self.geometry.at(time)
-        if geometry is self.geometry and self.camera.motion is None and self.spotlight.motion is None:
+        if geometry is self.geometry and self.camera.motion is None and not any(light.motion for light in self.lights):
             return self
-        camera, light = self.camera.at(time), self.spotlight.at(time)
-        views = {
-            "camera": find_view_fault(camera.position, camera.look_at, camera.up),
-            "spotlight": find_view_fault(light.position, light.look_at),
-        }
-        for name, fault in views.items():
-            if fault:
-                raise SceneError(f"{self.path}: {name}.motion: at {time:g} s {fault[0]} {fault[1]}")
-        return replace(
-            self, geometry=geometry, camera=replace(camera, motion=None), spotlight=replace(light, motion=None)
-        )
+        camera = self.camera.at(time)
+        if fault := find_view_fault(camera.position, camera.look_at, camera.up):
+            raise SceneError(f"{self.path}: camera.motion: at {time:g} s {fault[0]} {fault[1]}")
+        lights = tuple(self._place(light, number, time) for number, light in enumerate(self.lights))
+        return replace(self, geometry=geometry, camera=replace(camera, motion=None), lights=lights)
+
+    def _place(self, light: Light, number: int, time: float) -> Light:
+        """Return light `number` where it is at `time`. Raises SceneError if it looks nowhere there."""
+        try:
+            return light.at(time)
+        except LightError as error:
+            key, what = error.faults[0]
+            name = light.kind if light.kind == "spotlight" else f"light {number}"
+            raise SceneError(f"{self.path}: {name}.motion: at {time:g} s {key} {what}") from error
+
+
+_surface_lights: WeakKeyDictionary[Geometry, tuple[Any, SurfaceLight | None]] = WeakKeyDictionary()
+"""By geometry, with the materials and textures that they were made from."""
+
+
+def _find_surface_light(
+    geometry: Geometry, materials: tuple[Material, ...], textures: tuple[Texture, ...]
+) -> SurfaceLight | None:
+    """Return the emitting surfaces as a light; the same object for the same scene."""
+    if not any(any(material.emission) for material in materials):
+        return None
+    made_from, found = _surface_lights.get(geometry, (None, None))
+    if made_from != (materials, textures):
+        found = find_surface_light(geometry, materials, textures)
+        _surface_lights[geometry] = (materials, textures), found
+    return found

@@ -33,6 +33,13 @@ def find_groups(faces: Ints, ranges: Sequence[slice]) -> Ints:
     return groups
 
 
+def compute_face_areas(positions: Array, faces: Ints) -> Array:
+    """Compute the areas of `faces` (F, 3), float64 (F,)."""
+    a, b, c = (positions[faces[:, i]] for i in range(3))
+    areas: Array = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return areas
+
+
 def compute_face_normals(positions: Array, faces: Ints) -> Array:
     """Compute unit normals by winding, float64 (F, 3), of `faces` (F, 3); +y for degenerate ones."""
     a, b, c = (positions[faces[:, i]] for i in range(3))

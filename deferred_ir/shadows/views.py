@@ -7,7 +7,7 @@ import numpy as np
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.vpl_buffer import fill_view
 from deferred_ir.graph.ports import Buffer, Output
-from deferred_ir.scene.lights.spot import one_minus_cos
+from deferred_ir.scene.lights.spotlight import one_minus_cos
 from deferred_ir.shadows.settings import MapParams
 
 VIEW = np.dtype(
@@ -43,7 +43,7 @@ def describe_output() -> Output:
 
 def pack_views(frame: Frame, params: MapParams, edge: int) -> np.ndarray:
     """Return VIEW records (n,) of the scene's lights, in order, each with a layer of `edge` texels to itself."""
-    described = [view for light in frame.scene.lights for view in light.list_views()]
+    described = [view for light in frame.scene.direct_lights for view in light.list_views(frame.scene.bounds)]
     views = np.zeros(len(described), VIEW)
     for i, view in enumerate(described):
         views["position"][i] = view.position

@@ -193,7 +193,7 @@ def _sum_vpls(
     seen = paths.trace_camera_rays(size)
     direct = paths.estimate_direct(size, DISC_SAMPLES, seed, threads)
     emits = bounces > 0 and scene.emits
-    vpls = cast(scene.spotlight, tracer, params.count, params.pattern, seed, bounces=bounces) if emits else NONE
+    vpls = cast(scene.emitters, tracer, params.count, params.pattern, seed, bounces=bounces) if emits else NONE
     limits = params.limits(scene.geometry.diagonal)
     indirect = sum_radiance(tracer, seen, vpls, limits, threads=threads, progress=progress).reshape(direct.shape)
     return Reference(

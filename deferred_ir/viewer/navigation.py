@@ -9,7 +9,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.scene.camera import Camera, find_view_fault
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 
 UP: Vec3 = (0.0, 1.0, 0.0)
 SIDE: Vec3 = (0.0, 0.0, 1.0)

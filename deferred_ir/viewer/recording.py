@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.motion import CameraMotion, KeyframedSpotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
+from deferred_ir.scene.motion import CameraMotion, KeyframedLight
 from deferred_ir.scene.scene import Scene
 
 PERIOD = 0.2
@@ -40,6 +40,6 @@ class Recorder:
             path = CameraMotion(times, tuple(c.position for c in cameras), tuple(c.look_at for c in cameras))
             camera = replace(camera, motion=path)
         if len(set(lights)) > 1:
-            way = KeyframedSpotlight(times, tuple(x.position for x in lights), tuple(x.look_at for x in lights))
+            way = KeyframedLight(times, tuple(x.position for x in lights), tuple(x.look_at for x in lights))
             light = replace(light, motion=way)
-        return replace(scene, camera=camera, spotlight=light)
+        return replace(scene, camera=camera, lights=(light,))

@@ -91,4 +91,4 @@ class ReferenceJob:
 
 def _identify(scene: Scene, size: tuple[int, int], bounces: int) -> tuple[Any, ...]:
     """Return all that a reference depends on, apart from its samples."""
-    return scene.geometry, scene.camera, scene.spotlight, size, bounces
+    return scene.geometry, scene.camera, scene.lights, size, bounces

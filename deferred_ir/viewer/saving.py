@@ -22,7 +22,7 @@ from deferred_ir.graph.params import specs
 from deferred_ir.loading import scene_file, scene_file_writer
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.scene import RenderDefaults
 from deferred_ir.viewer.session import Session
 
@@ -85,7 +85,7 @@ def describe_scene(session: Session, stem: str) -> SceneFile:
         set=session.settings if builtin else {},
     )
     models = tuple(_place_model(entry, session.time) for entry in entries)
-    return SceneFile(scene.name, models, camera, light, render)
+    return SceneFile(scene.name, models, camera, (light,), render)
 
 
 def _choose_motions(session: Session) -> tuple[Camera, Spotlight]:

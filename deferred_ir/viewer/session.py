@@ -24,7 +24,7 @@ from deferred_ir.graph.roles import find_parameters
 from deferred_ir.loading.load import load
 from deferred_ir.output.image import Image
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.scene.scene import Scene
 from deferred_ir.viewer.navigation import as_camera
@@ -98,7 +98,7 @@ class Session:
     @property
     def shown(self) -> Scene:
         """The scene as it is drawn."""
-        return replace(self.scene, geometry=self.geometry, camera=self.eye, spotlight=self.spotlight)
+        return replace(self.scene, geometry=self.geometry, camera=self.eye, lights=(self.spotlight,))
 
     def invalidate(self) -> None:
         """Ask for a new picture: camera, light, scene or seed have changed."""

@@ -1,9 +1,9 @@
-"""Cast virtual point lights (VPLs): rays from the spotlight, each of which makes a diffuse light where it lands (Keller
+"""Cast virtual point lights (VPLs): rays from the lights, each of which makes a diffuse light where it lands (Keller
 1997).
 
-Rays are uniform on the disc of radius r = sin(fov/2), lifted to the sphere (Nusselt's analogue), so each of N carries
-E r^2/N cone(theta), and the VPL it makes has E_i = E r^2/N cone(theta) rho. As N grows, their sum is exactly one
-diffuse bounce. With a disc light, each ray starts at a random point of the disc.
+Each of N rays carries its part of a light's flux; one with flux P makes a VPL of intensity P rho/pi cos(theta). As N
+grows, their sum is exactly one diffuse bounce. Lights get rays by their luminous flux: each the whole number below or
+above its share, and over the seeds its share exactly, however small.
 
 Further bounces continue the paths. From the VPLs of one bounce, M are drawn by systematic resampling with probability
 proportional to their luminous power, and a ray leaves each about its normal, cosine-distributed. M falls from bounce to
@@ -14,6 +14,7 @@ of a bounce does not fluctuate: the M rays together carry on exactly the power t
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -24,7 +25,7 @@ from deferred_ir.rays.tracer import Tracer
 from deferred_ir.sampling import streams
 from deferred_ir.sampling.patterns import Pattern, resample_systematically, sample_unit_disc, sample_unit_square
 from deferred_ir.sampling.warps import lift_to_hemisphere, square_to_disc
-from deferred_ir.scene.lights.base import Light
+from deferred_ir.scene.lights.base import Bounds, Light
 from deferred_ir.vpls.kernel import cosine_ratio
 
 
@@ -48,15 +49,15 @@ NONE = Vpls(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, in
 
 
 def cast(
-    light: Light, tracer: Tracer, count: int, pattern: Pattern = "random", seed: int = 0, *, bounces: int = 1
+    lights: Sequence[Light], tracer: Tracer, count: int, pattern: Pattern = "random", seed: int = 0, *, bounces: int = 1
 ) -> Vpls:
-    """Cast `count` rays and follow them for `bounces` bounces. Returns the VPLs, those of the first bounce first.
+    """Cast `count` rays from `lights` and follow them for `bounces` bounces. Returns the VPLs, the first bounce first.
 
     Rays that miss or carry no power make no VPL and are not replaced.
     """
-    if count == 0:
+    if count == 0 or not lights:
         return NONE
-    origins, directions, carried = _start_rays(light, count, pattern, seed)
+    origins, directions, carried = _start_rays(lights, tracer.scene.bounds, count, pattern, seed)
     left = (carried @ LUMINANCE).sum()
     by_bounce = [_make_vpls(tracer, origins, directions, carried)]
     for bounce in range(1, bounces):
@@ -79,13 +80,41 @@ def cast(
     return Vpls(*(np.concatenate([getattr(part, f.name) for part in by_bounce]) for f in fields(Vpls)))
 
 
-def _start_rays(light: Light, count: int, pattern: Pattern, seed: int) -> tuple[Array, Array, Array]:
-    """Return the rays of the first bounce: origins, unit directions and what they carry, (n, 3) each."""
-    places = None
-    if light.has_area:
+def _start_rays(
+    lights: Sequence[Light], bounds: Bounds, count: int, pattern: Pattern, seed: int
+) -> tuple[Array, Array, Array]:
+    """Return the rays of the first bounce: origins, unit directions and flux over pi that they carry, (n, 3) each."""
+    points, places = sample_unit_disc(pattern, count, seed), None
+    if any(light.has_area for light in lights):
         square = sample_unit_square(pattern, count, streams.light_disc_pattern(seed))
         places = square_to_disc(streams.light_disc(seed).permutation(square))
-    return light.emit(sample_unit_disc(pattern, count, seed), places)
+    if len(lights) == 1:
+        return lights[0].emit(points, places if lights[0].has_area else None, bounds)
+    parts = []
+    for light, part, factor in deal_rays(lights, bounds, count, seed):
+        # A stretch of a well spread sequence is well spread.
+        own = places[part] if places is not None and light.has_area else None
+        origins, directions, carried = light.emit(points[part], own, bounds)
+        parts.append((origins, directions, carried * factor))
+    origins, directions, carried = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return origins, directions, carried
+
+
+def deal_rays(lights: Sequence[Light], bounds: Bounds, count: int, seed: int) -> Iterator[tuple[Light, slice, float]]:
+    """Deal `count` rays to lights by flux. Yields each light that gets some, which, and a factor on what they carry.
+
+    A light that should get less than one ray gets one in some frames, and then carries as much more.
+    """
+    flux = np.array([light.measure_flux(bounds) for light in lights])
+    if not flux.sum() > 0:
+        return
+    drawn = resample_systematically(flux, count, streams.dealing(seed).random())
+    given = np.bincount(drawn, minlength=len(lights))
+    wanted = flux / flux.sum() * count
+    ends = np.cumsum(given)
+    for light, many, share, end in zip(lights, given.tolist(), wanted.tolist(), ends.tolist(), strict=True):
+        if many:
+            yield light, slice(end - many, end), 1.0 if share >= 1 else many / share
 
 
 def _make_vpls(tracer: Tracer, origins: Array, directions: Array, carried: Array) -> Vpls:

@@ -19,7 +19,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.parallel import run_in_order
-from deferred_ir.rays.direct import compute_irradiance
+from deferred_ir.rays.direct import AllLight
 from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.sampling import pixel_blocks, streams
@@ -50,7 +50,8 @@ def trace_residual(job: PixelJob, limits: VplLimits, *, samples: float, bounces:
     per_task = max(1, RAYS // each)
     tasks = [(i, slice(start, start + per_task)) for i, start in enumerate(range(0, len(traced), per_task))]
     lattice = pixel_blocks.find_lattice(total)
-    rays, emission = _Rays(job.tracer, seen, limits, bounces), np.asarray(job.tracer.scene.spotlight.emission, float)
+    light = AllLight(job.tracer)
+    rays, emission = _Rays(job.tracer, seen, limits, bounces, light), light.unit
 
     def work(task: tuple[int, slice]) -> tuple[Ints, Array]:
         number, chosen = task
@@ -77,12 +78,13 @@ class _Rays:
     seen: Surfaces
     limits: VplLimits
     bounces: int
+    light: AllLight
 
     def trace(self, rows: Ints, each: int, points: Array, rng: np.random.Generator) -> tuple[Ints, Array]:
         """Trace `each` rays from each of the surfaces `rows` (n,). Few meet a surface that is near.
 
         points: float32 (n * each, 2), in [0, 1). Returns the numbers of the rays that do, (m,), ascending, and the
-        irradiance over emission that each brings, float64 (m, 3).
+        irradiance over the light's unit that each brings, float64 (m, 3).
         """
         tracer, seen = self.tracer, self.seen.rows(rows)
         surface = np.repeat(np.arange(len(rows)), each)
@@ -101,7 +103,7 @@ class _Rays:
         for bounce in range(self.bounces):
             if bounce:
                 row, throughput, at = self._carry_on(row, throughput, at, rng)
-            carried[row] += throughput * compute_irradiance(tracer.scene.spotlight, tracer, at, rng)[:, None]
+            carried[row] += throughput * self.light.irradiate(at, rng)
         return found, carried
 
     def _carry_on(self, row: Ints, throughput: Array, at: Hits, rng: np.random.Generator) -> tuple[Ints, Array, Hits]:

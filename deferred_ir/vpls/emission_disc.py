@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from deferred_ir.base.arrays import Array
-from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
+from deferred_ir.scene.lights.spotlight import Spotlight, one_minus_cos
 
 FLAT = 0.75
 """x at which the soft edge begins."""

@@ -22,7 +22,7 @@ from deferred_ir.sampling import streams
 from deferred_ir.sampling.disc_voronoi import VoronoiCells, find_most_crowded
 from deferred_ir.sampling.warps import build_basis
 from deferred_ir.sampling.warps import square_to_disc as unit_disc
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.vertices import transform_points
 from deferred_ir.vpls.cast import Vpls
 from deferred_ir.vpls.emission_disc import EmissionDisc

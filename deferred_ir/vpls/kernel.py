@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools
-from deferred_ir.scene.lights.spot import one_minus_cos
+from deferred_ir.scene.lights.spotlight import one_minus_cos
 
 TINY = np.float32(1e-37)
 """Keeps divisors off 0 where a VPL lies on the surface and the cosines are 0."""

@@ -9,7 +9,8 @@ import numpy as np
 from deferred_ir.base.arrays import Array
 from deferred_ir.loading.models import move_uvs_home
 from deferred_ir.profiling.checks.change_triangles import with_geometry
-from deferred_ir.scene.scene import Scene, Texture
+from deferred_ir.scene.materials import Texture
+from deferred_ir.scene.scene import Scene
 
 GREY = 188
 """An sRGB value, about one half in linear light."""

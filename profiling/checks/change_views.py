@@ -47,12 +47,14 @@ def scale(scene: Scene, factor: float) -> Scene:
         scene,
         geometry=replace(scene.geometry, positions=scene.geometry.positions * factor),
         camera=replace(camera, position=point(camera.position), look_at=point(camera.look_at)),
-        spotlight=replace(
-            light,
-            position=point(light.position),
-            look_at=point(light.look_at),
-            radius=light.radius * factor,
-            emission=vec3(np.multiply(light.emission, factor**2)),
+        lights=(
+            replace(
+                light,
+                position=point(light.position),
+                look_at=point(light.look_at),
+                radius=light.radius * factor,
+                emission=vec3(np.multiply(light.emission, factor**2)),
+            ),
         ),
     )
 
@@ -60,7 +62,7 @@ def scale(scene: Scene, factor: float) -> Scene:
 def shift(scene: Scene, by: Vec3) -> Scene:
     """Translate the whole scene."""
     geometry = replace(scene.geometry, positions=scene.geometry.positions + by)
-    return replace(scene, geometry=geometry, camera=scene.camera.translate(by), spotlight=scene.spotlight.translate(by))
+    return replace(scene, geometry=geometry, camera=scene.camera.translate(by), lights=(scene.spotlight.translate(by),))
 
 
 def brighten(scene: Scene, factor: float) -> Scene:
@@ -70,7 +72,7 @@ def brighten(scene: Scene, factor: float) -> Scene:
 
 def with_light(scene: Scene, **keys: Any) -> Scene:
     """Change values of the spotlight."""
-    return replace(scene, spotlight=replace(scene.spotlight, **keys))
+    return replace(scene, lights=(replace(scene.spotlight, **keys),))
 
 
 def tilt_up(scene: Scene, angle: float) -> Scene:

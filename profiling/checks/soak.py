@@ -140,7 +140,7 @@ def move_light(scene: Scene) -> Scene:
     """Let the scene's light move."""
     reach = 0.05 * scene.geometry.diagonal
     motion = LissajousMotion((reach, reach / 4, reach), (3.0, 2.0))
-    return replace(scene, spotlight=replace(scene.spotlight, motion=motion))
+    return replace(scene, lights=(replace(scene.spotlight, motion=motion),))
 
 
 def draw_stretch(one: ir.Renderer, scene: Scene, frames: int) -> ir.Image:

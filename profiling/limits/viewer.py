@@ -21,7 +21,7 @@ from deferred_ir.gl.window import Window
 from deferred_ir.loading.load import load
 from deferred_ir.profiling.figures import markdown
 from deferred_ir.profiling.study import command_line, run
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.scene import Scene
 from deferred_ir.viewer.app import Viewer
 from deferred_ir.viewer.panels.side_panel import WIDTH

@@ -11,8 +11,9 @@ from deferred_ir.base.colour import srgb_table
 from deferred_ir.sampling.warps import build_basis
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.geometry import Geometry
-from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
-from deferred_ir.scene.scene import Material, Scene, Texture
+from deferred_ir.scene.lights.spotlight import Spotlight, one_minus_cos
+from deferred_ir.scene.materials import Material, Texture
+from deferred_ir.scene.scene import Scene
 
 POINT_POWER = 4 * np.pi
 """Power in watts at which Blender's point light has 1 W/sr for each unit of its nodes' emission."""

@@ -10,8 +10,9 @@ from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.colour import srgb_table
 from deferred_ir.base.errors import SettingError
 from deferred_ir.frame.frame import NEAR
-from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
-from deferred_ir.scene.scene import Material, Scene
+from deferred_ir.scene.lights.spotlight import Spotlight, one_minus_cos
+from deferred_ir.scene.materials import Material
+from deferred_ir.scene.scene import Scene
 
 SAMPLER = "multijitter"
 CONE_TEXELS = (1024, 4096)

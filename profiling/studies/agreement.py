@@ -46,7 +46,7 @@ def measure(scene: Scene, size: tuple[int, int], clamp: float, fov: float) -> di
         raise ValueError(f"{SPP} paths a pixel are too few for a variance")
     limits, sums = VplLimits.from_angle(fov, clamp * scene.geometry.diagonal), []
     for seed in track(range(SCRAMBLES), scene.name):
-        vpls = cast(scene.spotlight, tracer, COUNT, "sobol", seed)
+        vpls = cast(scene.emitters, tracer, COUNT, "sobol", seed)
         sums.append(blocks(sum_radiance(tracer, seen, vpls, limits).reshape(traced.indirect.shape)))
     ours, paths = np.array(sums), blocks(traced.indirect)
     variance = ours.var(axis=0, ddof=1) / SCRAMBLES + blocks(traced.variance) / BLOCK**2

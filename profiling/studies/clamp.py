@@ -43,7 +43,7 @@ def measure(scene: Scene, fov: float) -> dict[str, list[float]]:
     with progress_bar(scene.name, len(COUNTS) * SEEDS * len(CLAMPS)) as bar:
         for count in COUNTS:
             for seed in range(SEEDS):
-                vpls = cast(scene.spotlight, tracer, count, "sobol", seed)
+                vpls = cast(scene.emitters, tracer, count, "sobol", seed)
                 for i, clamp in enumerate(CLAMPS):
                     limits = VplLimits.from_angle(fov, clamp * scene.geometry.diagonal)
                     indirect = sum_radiance(tracer, seen, vpls, limits)

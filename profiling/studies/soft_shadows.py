@@ -26,8 +26,9 @@ from deferred_ir.profiling.study import command_line, run
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.geometry import Geometry, Model
-from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.scene import Material, Scene
+from deferred_ir.scene.lights.spotlight import Spotlight
+from deferred_ir.scene.materials import Material
+from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.path_tracer import PathTracer
 
@@ -56,7 +57,7 @@ def build_scene(quads: Sequence[Quad], camera: Camera, spotlight: Spotlight) -> 
         textures=(),
         models=(Model("soft shadows", 0, 4 * len(quads)),),
         camera=camera,
-        spotlight=spotlight,
+        lights=(spotlight,),
     )
 
 

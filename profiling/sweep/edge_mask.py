@@ -93,7 +93,7 @@ def _trace(scene: Scene, tracer: Tracer, size: tuple[int, int], first: int, last
     material = np.where(hits.hit, scene.geometry.face_materials[hits.face], -1)
 
     light = scene.spotlight
-    sources = light.locate(None, len(hits.position))
+    sources = np.broadcast_to(np.asarray(light.position, float), hits.position.shape)
     to_light = sources - hits.position
     to_light /= np.maximum(np.linalg.norm(to_light, axis=1, keepdims=True), 1e-150)
     lit = hits.hit & (np.einsum("ij,ij->i", to_light, hits.normal) > 0) & (light.radiate(-to_light) > 0)

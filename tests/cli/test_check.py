@@ -114,7 +114,7 @@ def test_the_scene_file_has_a_say(capsys, small_scene):
 
 def test_a_dark_light_is_told(capsys, monkeypatch, tmp_path):
     scene = load("cornell")
-    dark = replace(scene, spotlight=replace(scene.spotlight, emission=(0.0, 0.0, 0.0)))
+    dark = replace(scene, lights=(replace(scene.spotlight, emission=(0.0, 0.0, 0.0)),))
     monkeypatch.setattr("deferred_ir.loading.load.load", lambda _: dark)
     assert main(["check", "cornell", *ONE, "--json", str(tmp_path / "f.json")]) == 0
     output = capsys.readouterr()

@@ -69,7 +69,7 @@ def test_many_lights_are_added_up_in_the_same_blocks_without_those_that_are_drop
 def test_a_spotlight_that_shines_where_nobody_looks_gets_no_map(renderer):
     scene = gable()
     away = replace(
-        scene, spotlight=replace(scene.spotlight, position=(-0.7, 3.0, 0.0), look_at=(-0.7, 0.0, 0.0), fov=10)
+        scene, lights=(replace(scene.spotlight, position=(-0.7, 3.0, 0.0), look_at=(-0.7, 0.0, 0.0), fov=10),)
     )
     (image, counters, _), (full, kept, _) = both(renderer, away, "deferred", vpls=16)
     assert counters["maps_drawn"] == 0
@@ -106,7 +106,7 @@ def test_without_vpls_nothing_is_cast_shared_or_filtered(renderer, graph):
 
 @pytest.mark.parametrize("graph", ["deferred", "interleaved", "mapped", "forward"])
 def test_without_light_there_are_no_maps_and_no_rays(renderer, graph):
-    scene = replace(room(), spotlight=replace(room().spotlight, emission=DARK))
+    scene = replace(room(), lights=(replace(room().spotlight, emission=DARK),))
     (image, counters, plan), (full, _, kept) = both(renderer, scene, graph, vpls=8)
     assert same_pixels(image, full)
     assert not image.radiance.any()
@@ -158,7 +158,7 @@ def test_the_atlas_has_room_for_the_lights_that_live(renderer, monkeypatch):
     allocate = GpuTexture._allocate
     monkeypatch.setattr(GpuTexture, "_allocate", lambda self, layers: (made.append(layers), allocate(self, layers)))
     settings = {"shadow_maps.spot_size": 64, "shadow_maps.vpl_size": 16}
-    half = replace(gable(), spotlight=replace(gable().spotlight, position=(0.1, 1.6, 1.0), look_at=(0.1, -1.0, 1.0)))
+    half = replace(gable(), lights=(replace(gable().spotlight, position=(0.1, 1.6, 1.0), look_at=(0.1, -1.0, 1.0)),))
     one = renderer(SIZE, set=settings)
     image = one.render(half, vpls=256)
     lights = one.executor.resource(("vpl", "vpls")).records

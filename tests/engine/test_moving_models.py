@@ -29,7 +29,7 @@ from deferred_ir import load
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.meshes.posed import PosedMesh
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.motion import ModelMotion
 from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
@@ -288,7 +288,7 @@ def test_a_model_that_leaves_where_it_was(renderer):
     scene = build(box((-1, -1, -1), (1, -0.9, 1)), BLOCK, motions=(None, motion))
     light = Spotlight((0.0, 7.5, -5.0), (0.0, 5.0, -6.0), 60.0, (5.0, 5.0, 5.0))
     scene = replace(
-        scene, camera=replace(scene.camera, position=(0.0, 6.5, -3.0), look_at=(0.0, 6.0, -6.0)), spotlight=light
+        scene, camera=replace(scene.camera, position=(0.0, 6.5, -3.0), look_at=(0.0, 6.0, -6.0)), lights=(light,)
     )
     one, other = renderer(SIZE), renderer(SIZE)
     one.render(scene, vpls=8)

@@ -14,7 +14,7 @@ from deferred_ir.engine.measurement import Measurement
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.timers import DELAY
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.motion import LissajousMotion
 
 SIZE = (40, 24)
@@ -59,7 +59,7 @@ def test_the_same_geometry_is_uploaded_once(renderer):
     one, scene = renderer(SIZE), room()
     one.render(scene, vpls=4)
     buffers, tracer = one._buffers, one.tracer()
-    moved = replace(scene, camera=replace(scene.camera, fov=30.0), spotlight=replace(scene.spotlight, fov=20.0))
+    moved = replace(scene, camera=replace(scene.camera, fov=30.0), lights=(replace(scene.spotlight, fov=20.0),))
     assert not np.array_equal(one.render(moved, vpls=4).radiance, one.render(scene, vpls=4).radiance)
     assert one._buffers is buffers
     assert one.tracer() is tracer
@@ -174,11 +174,11 @@ def test_a_renderer_works_in_the_thread_that_made_it():
 
 def test_time_moves_what_moves(renderer):
     scene = room()
-    moving = replace(scene, spotlight=replace(scene.spotlight, motion=LissajousMotion((0.3, 0, 0.3), (1, 1))))
+    moving = replace(scene, lights=(replace(scene.spotlight, motion=LissajousMotion((0.3, 0, 0.3), (1, 1))),))
     one = renderer(SIZE)
     at_start, later = (one.render(moving, vpls=4, time=time).radiance for time in (0.0, 2.0))
     assert not np.array_equal(at_start, later)
-    there = replace(scene, spotlight=replace(moving.spotlight.at(2.0), motion=None))
+    there = replace(scene, lights=(replace(moving.spotlight.at(2.0), motion=None),))
     np.testing.assert_array_equal(one.render(there, vpls=4).radiance, later)
 
 
@@ -275,6 +275,6 @@ def test_extreme_lights_give_finite_numbers(renderer):
         replace(scene.spotlight, fov=179.9),
         Spotlight((1.0, 1.0, 1.0), (-1.0, -1.0, -1.0), 60.0),  # in the corner
     ):
-        image = renderer(SIZE).render(replace(scene, spotlight=light), vpls=8)
+        image = renderer(SIZE).render(replace(scene, lights=(light,)), vpls=8)
         assert np.isfinite(image.radiance).all()
         assert image.radiance.min() >= 0

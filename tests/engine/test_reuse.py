@@ -32,7 +32,7 @@ class Broken:
 
 
 def light(**changes):
-    return replace(ROOM, spotlight=replace(ROOM.spotlight, **changes))
+    return replace(ROOM, lights=(replace(ROOM.spotlight, **changes),))
 
 
 X, Y, Z = ROOM.spotlight.position

@@ -49,7 +49,7 @@ def test_without_vpls_as_well(renderer, graph):
 
 
 def test_with_a_disc_that_casts_soft_shadows(renderer):
-    scene = replace(OPEN, spotlight=replace(OPEN.spotlight, radius=0.2))
+    scene = replace(OPEN, lights=(replace(OPEN.spotlight, radius=0.2),))
     assert found(renderer, "deferred", scene) == []
     assert found(renderer, "mapped by rays", scene) == []
 

@@ -36,11 +36,11 @@ def coloured() -> Scene:
 
 
 def wide() -> Scene:
-    return replace(room(), spotlight=replace(room().spotlight, fov=160.0))
+    return replace(room(), lights=(replace(room().spotlight, fov=160.0),))
 
 
 def disc() -> Scene:
-    return replace(smooth_scene(), spotlight=replace(smooth_scene().spotlight, radius=0.1))
+    return replace(smooth_scene(), lights=(replace(smooth_scene().spotlight, radius=0.1),))
 
 
 SCENES = {made.__name__: made for made in (floor, partly_textured, room, smooth_scene, coloured, wide, disc)}

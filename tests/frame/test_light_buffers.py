@@ -14,7 +14,7 @@ from deferred_ir.frame.direct_lights import LIGHT, LightVersions, find_view_owne
 from deferred_ir.frame.vpl_buffer import VPL, MapVersions, VplParams, fill_view, pack_vpls
 from deferred_ir.sampling.warps import build_basis
 from deferred_ir.scene.lights.base import LightView
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.shadows.views import VIEW
 from deferred_ir.vpls.cast import NONE, Vpls
 
@@ -44,7 +44,7 @@ def test_records_are_vec4_of_std140():
 def test_the_record_of_the_spotlight_holds_what_shaders_read():
     scene = room()
     light = replace(scene.spotlight, radius=0.25)
-    records = pack_lights(replace(scene, spotlight=light))
+    records = pack_lights(replace(scene, lights=(light,)))
     assert records.shape == (1,)
     np.testing.assert_array_equal(records["position"][0], np.float32(light.position))
     np.testing.assert_allclose(records["axis"][0], light.axis, atol=1e-7)
@@ -59,13 +59,13 @@ class Lamp(Spotlight):
 
     views: int = 1
 
-    def list_views(self) -> tuple[LightView, ...]:
-        return super().list_views() * self.views
+    def list_views(self, bounds) -> tuple[LightView, ...]:
+        return super().list_views(bounds) * self.views
 
 
 def test_lights_have_any_number_of_views():
     lights = [Lamp((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), views=views) for views in (2, 0, 1)]
-    scene = SimpleNamespace(lights=lights)
+    scene = SimpleNamespace(direct_lights=lights, bounds=None)
     np.testing.assert_array_equal(find_view_owners(scene), [0, 0, 2])
     assert [pack_lights(scene)["view"][i] for i in (0, 2)] == [0, 2]
 
@@ -104,10 +104,10 @@ def test_a_map_stays_while_its_light_looks_the_same():
     scene, versions = room(), LightVersions()
     first = versions.update(pack_lights(scene), scene)
     for change in ({"emission": (9.0, 9.0, 9.0)}, {"radius": 0.1}, {}):
-        same = replace(scene, spotlight=replace(scene.spotlight, **change))
+        same = replace(scene, lights=(replace(scene.spotlight, **change),))
         assert versions.update(pack_lights(same), same) == first
     for change in ({"fov": 40.0}, {"position": (0.1, 0.9, 0.1)}, {"look_at": (0.2, -1.0, 0.0)}):
-        other = replace(scene, spotlight=replace(scene.spotlight, **change))
+        other = replace(scene, lights=(replace(scene.spotlight, **change),))
         assert versions.update(pack_lights(other), other) != first
         first = versions.update(pack_lights(scene), scene)
 

@@ -24,6 +24,7 @@ THIRD_PARTIES = {
     "trimesh": ("loading",),
     "PIL": ("loading", "output", "truth"),
     "OpenEXR": ("output",),
+    "OpenImageIO": ("scene",),
     "glfw": ("gl", "viewer"),
     "imgui_bundle": ("gl", "viewer"),
     "argparse": ("cli",),

@@ -17,10 +17,10 @@ from PIL import Image
 
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading import merge, models
-from deferred_ir.scene.albedo import look_up_albedo
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.surface_colours import look_up_albedo
 
 TYPES = {"float32": 5126, "uint8": 5121, "uint16": 5123, "uint32": 5125}
 SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
@@ -115,7 +115,7 @@ def test_base_colour_multiplies_the_texture_and_vertex_colours(tmp_path: Path) -
     colors = np.tile(np.array([1, 0.3, 1, 0.5], np.float32), (3, 1))
     document.triangle({"material": 0}, TEXCOORD_0=document.accessor(UVS), COLOR_0=document.accessor(colors))
     scene = load(document.write(tmp_path / "m.glb"))
-    found = look_up_albedo(scene, np.array([0]), np.full((1, 3), 1 / 3))
+    found = look_up_albedo(scene.geometry, scene.materials, scene.textures, np.array([0]), np.full((1, 3), 1 / 3))
     assert found == pytest.approx(np.array([[0.5, 0.3, 0.0]]), abs=1e-6)
     assert scene.geometry.uvs == pytest.approx(np.array([[0, 0], [1, 0], [0, 1]]))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,13 +18,18 @@ from deferred_ir.base.colour import linear_from_srgb
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading import merge, models, textures
 from deferred_ir.loading.model_data import GREY
-from deferred_ir.scene.albedo import look_up_albedo, sample_texture
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.scene import Scene, Texture
+from deferred_ir.scene.lights.spotlight import Spotlight
+from deferred_ir.scene.materials import Texture
+from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.surface_colours import look_up_albedo, sample_texture
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 FACES = "usemtl m\nf 1/1 2/2 3/3 4/4\n"
+
+
+def albedo_at(scene: Scene, faces: Any, weights: Any) -> Any:
+    return look_up_albedo(scene.geometry, scene.materials, scene.textures, faces, weights)
 
 
 def scene_of(path: Path) -> Scene:
@@ -50,7 +56,7 @@ def test_kd_is_not_rounded(tmp_path: Path) -> None:
     assert scene.materials[0].albedo == (0.1234, 0.03, 0.98765)
     assert scene.materials[0].name == "m"
     weights = np.array([[0.2, 0.3, 0.5]])
-    assert look_up_albedo(scene, np.array([0]), weights) == pytest.approx(np.array([[0.1234, 0.03, 0.98765]]))
+    assert albedo_at(scene, np.array([0]), weights) == pytest.approx(np.array([[0.1234, 0.03, 0.98765]]))
     assert scene.notes == ()
 
 
@@ -119,7 +125,7 @@ def test_map_kd_replaces_kd(tmp_path: Path) -> None:
     assert scene.materials[0].albedo == (1.0, 1.0, 1.0)
     assert scene.materials[0].texture == 0
     assert scene.textures[0].pixels.shape == (2, 4, 3)
-    found = look_up_albedo(scene, np.array([0, 1]), np.full((2, 3), 1 / 3))
+    found = albedo_at(scene, np.array([0, 1]), np.full((2, 3), 1 / 3))
     assert found == pytest.approx(np.tile([srgb(188), 0, 1], (2, 1)), rel=1e-6)
 
 
@@ -136,7 +142,9 @@ def test_texture_stands_upright(tmp_path: Path) -> None:
         system = np.vstack([edges.T, np.ones(3)])
         weights = np.linalg.solve(system, [*centre_of_texel, 1.0])
         if weights.min() > -1e-9:
-            assert look_up_albedo(scene, np.array([face]), weights[None]) == pytest.approx(np.ones((1, 3)))
+            assert look_up_albedo(
+                scene.geometry, scene.materials, scene.textures, np.array([face]), weights[None]
+            ) == pytest.approx(np.ones((1, 3)))
             position = weights @ geometry.positions[geometry.faces[face]]
             assert position[:2] == pytest.approx(centre_of_texel)  # v runs up, as y does
 
@@ -212,14 +220,16 @@ def test_vertex_colours_are_srgb_and_multiply(tmp_path: Path) -> None:
     linear = np.vectorize(srgb)(levels[:, :3])
     assert scene.geometry.colors == pytest.approx(linear, rel=1e-6)
     weights = np.array([[0.2, 0.3, 0.5]])
-    assert look_up_albedo(scene, np.array([0]), weights) == pytest.approx(weights @ linear, rel=1e-6)
+    assert albedo_at(scene, np.array([0]), weights) == pytest.approx(weights @ linear, rel=1e-6)
 
 
 def test_obj_vertex_colours_multiply_kd(tmp_path: Path) -> None:
     vertices = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.5\n"
     scene = scene_with(tmp_path, "newmtl m\nKd 0.5 0.5 0.5\n", "usemtl m\nf 1 2 3\n", vertices)
     assert scene.geometry.colors == pytest.approx(np.array([[1, 0, 0], [0, 1, 0], [0, 0, srgb(127.5)]]), rel=1e-6)
-    assert look_up_albedo(scene, np.array([0]), np.array([[1.0, 0, 0]])) == pytest.approx(np.array([[0.5, 0, 0]]))
+    assert look_up_albedo(
+        scene.geometry, scene.materials, scene.textures, np.array([0]), np.array([[1.0, 0, 0]])
+    ) == pytest.approx(np.array([[0.5, 0, 0]]))
 
 
 def test_face_colours(tmp_path: Path) -> None:
@@ -227,7 +237,7 @@ def test_face_colours(tmp_path: Path) -> None:
     box.visual.face_colors = np.arange(12)[:, None] * [20, 10, 5, 0] + [0, 0, 0, 255]
     box.export(tmp_path / "model.ply")
     scene = scene_of(tmp_path / "model.ply")
-    found = look_up_albedo(scene, np.arange(12), np.full((12, 3), 1 / 3))
+    found = albedo_at(scene, np.arange(12), np.full((12, 3), 1 / 3))
     assert found == pytest.approx(np.vectorize(srgb)(np.arange(12)[:, None] * [20, 10, 5]), rel=1e-6)
 
 

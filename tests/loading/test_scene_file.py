@@ -11,7 +11,8 @@ from toml_text import to_toml
 
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading import scene_file
-from deferred_ir.scene.motion import KeyframedSpotlight, LissajousMotion
+from deferred_ir.scene.lights.spotlight import Spotlight
+from deferred_ir.scene.motion import KeyframedLight, LissajousMotion
 
 MODEL = '[[model]]\npath = "box.obj"\n'
 CAMERA = "[camera]\nposition = [0, 1, 5]\nlook_at = [0, 1, 0]\n"
@@ -84,9 +85,10 @@ def test_every_key_arrives(tmp_path: Path) -> None:
     assert (result.camera.position, result.camera.fov) == ((0.0, 1.0, 5.0), 50.0)
     assert result.camera.motion is not None
     assert result.camera.motion.times == (0.0, 1.0, 2.0)
-    assert result.spotlight is not None
-    assert (result.spotlight.emission, result.spotlight.radius) == ((10.0, 9.5, 8.0), 0.1)
-    assert result.spotlight.motion == LissajousMotion((9.0, 1.0, 2.5), (0.6, 0.5))
+    (light,) = result.lights
+    assert isinstance(light, Spotlight)
+    assert (light.emission, light.radius) == ((10.0, 9.5, 8.0), 0.1)
+    assert light.motion == LissajousMotion((9.0, 1.0, 2.5), (0.6, 0.5))
     render = result.render
     assert (render.graph, render.size) == (str(tmp_path / "graphs/own.toml"), (640, 480))
     assert (render.vpls, render.seed) == (128, 7)
@@ -98,24 +100,26 @@ def test_defaults(tmp_path: Path) -> None:
     assert result.name == "room"  # the file's
     assert result.camera is not None
     assert (result.camera.up, result.camera.fov, result.camera.motion) == ((0.0, 1.0, 0.0), 60.0, None)
-    assert result.spotlight is not None
-    assert (result.spotlight.fov, result.spotlight.radius) == (80.0, 0.0)
+    (light,) = result.lights
+    assert isinstance(light, Spotlight)
+    assert (light.fov, light.radius) == (80.0, 0.0)
     assert result.render.size is None
 
 
 def test_camera_and_spotlight_may_be_missing(tmp_path: Path) -> None:
     result = read(tmp_path, MODEL)
     assert result.camera is None
-    assert result.spotlight is None
+    assert result.lights == ()
 
 
 def test_keyframed_spotlight(tmp_path: Path) -> None:
     motion = "[spotlight.motion]\nkind = 'keyframes'\ntimes = [0, 1]\n"
     motion += "positions = [[0, 4, 0], [1, 4, 0]]\nlook_ats = [[0, 0, 0], [1, 0, 0]]\n"
     result = read(tmp_path, MODEL + SPOTLIGHT + motion)
-    assert result.spotlight is not None
-    assert isinstance(result.spotlight.motion, KeyframedSpotlight)
-    assert result.spotlight.at(1.0).position == pytest.approx((1, 4, 0))
+    (light,) = result.lights
+    assert isinstance(light, Spotlight)
+    assert isinstance(light.motion, KeyframedLight)
+    assert light.at(1.0).position == pytest.approx((1, 4, 0))
 
 
 def test_a_graph_by_name_stays_a_name(tmp_path: Path) -> None:

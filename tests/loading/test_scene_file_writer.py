@@ -10,15 +10,32 @@ import pytest
 from deferred_ir.loading import scene_file, scene_file_writer
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.motion import CameraMotion, KeyframedSpotlight, LissajousMotion, ModelMotion
+from deferred_ir.scene.lights.directional import Directional
+from deferred_ir.scene.lights.disc import Disc
+from deferred_ir.scene.lights.environment import Environment
+from deferred_ir.scene.lights.point import Point
+from deferred_ir.scene.lights.rect import Rect
+from deferred_ir.scene.lights.sphere import Sphere
+from deferred_ir.scene.lights.spot import Spot
+from deferred_ir.scene.lights.spotlight import Spotlight
+from deferred_ir.scene.motion import CameraMotion, KeyframedLight, LissajousMotion, ModelMotion
 from deferred_ir.scene.scene import RenderDefaults
 
 A, B = (0.1, 0.2, 1e-9), (1.0, -2.5, 3e7)
 MOTION = ModelMotion((0.0, 2.0), (A, B), ((0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0)))
 CAMERA = Camera(A, B, (0.6, 0.8, 0.0), 33.25, CameraMotion((0.0, 1.0), (A, B), (B, A)))
 LIGHT = Spotlight(A, B, 71.5, (1.0, 0.0, 1e6), 0.25, LissajousMotion((0.1, 0.0, 0.2), (1.0, 2.0)))
-KEYFRAMED = replace(LIGHT, motion=KeyframedSpotlight((0.0, 0.5, 3.0), (A, B, A), (B, A, B)))
+KEYFRAMED = replace(LIGHT, motion=KeyframedLight((0.0, 0.5, 3.0), (A, B, A), (B, A, B)))
+LIGHTS = (
+    Point(A, (1.0, 2.0, 3.0), 0.5, KeyframedLight((0.0, 1.0), (A, B))),
+    Spot(A, B, 60.0, 20.0, (1.0, 0.0, 2.0), LissajousMotion((0.1, 0.0, 0.2), (1.0, 2.0))),
+    Directional(A, B, (1.0, 0.5, 0.25), 0.5),
+    Rect(A, B, (0.5, 1.5), (0.0, 1.0, 0.0), (1.0, 2.0, 3.0)),
+    Disc(A, B, 0.25, (1.0, 2.0, 3.0)),
+    Sphere(A, 0.25, (1.0, 2.0, 3.0)),
+    Environment(radiance=(0.5, 0.5, 1.0), rotation=30.0, scale=2.0),
+    LIGHT,
+)
 MODELS = (ModelEntry(Path("/models/a b.obj"), 0.5, A, MOTION), ModelEntry(Path("/models/ü.glb")))
 RENDER = RenderDefaults("accurate", (640, 480), 32, 7, {"tonemap.exposure": "auto", "vpl.clamp": 0.1, "vpl.bounces": 2})
 
@@ -26,8 +43,8 @@ RENDER = RenderDefaults("accurate", (640, 480), 32, 7, {"tonemap.exposure": "aut
 @pytest.mark.parametrize(
     "scene",
     [
-        SceneFile("hall", MODELS, CAMERA, LIGHT, RENDER),
-        SceneFile("hall", MODELS, replace(CAMERA, motion=None), KEYFRAMED, RenderDefaults("/graphs/mine.toml")),
+        SceneFile("hall", MODELS, CAMERA, (LIGHT, *LIGHTS), RENDER),
+        SceneFile("hall", MODELS, replace(CAMERA, motion=None), (KEYFRAMED,), RenderDefaults("/graphs/mine.toml")),
         SceneFile("ü [2] \"quoted\" #", MODELS[1:]),
     ],
     ids=["everything", "other kinds", "least"],

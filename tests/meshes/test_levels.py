@@ -14,7 +14,7 @@ from small_scenes import box, build, room, scaled, sphere
 from deferred_ir.base.errors import GraphError
 from deferred_ir.meshes import levels as detail
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.shadows.settings import MapParams
 
 

@@ -173,7 +173,7 @@ def test_short_edges_drawn_straight_agree_with_rays_and_long_ones_do_not():
 
 def test_the_spotlight_draws_the_scene_itself(renderer):
     scene = room()
-    scene = replace(scene, spotlight=replace(scene.spotlight, fov=160.0))
+    scene = replace(scene, lights=(replace(scene.spotlight, fov=160.0),))
     images = [
         renderer((48, 48), set={**PRE, "shadow_maps.tessellation": choice}).render(scene, vpls=0).radiance
         for choice in ("pre", "adaptive")

@@ -85,7 +85,7 @@ def test_a_seed_is_an_image(renderer):
 def test_the_unit_of_light_does_not_matter(renderer, factor):
     one, scene = renderer((40, 30), "denoised"), room()
     emission = tuple(factor * value for value in scene.spotlight.emission)
-    image = one.render(replace(scene, spotlight=replace(scene.spotlight, emission=emission)), vpls=16).radiance
+    image = one.render(replace(scene, lights=(replace(scene.spotlight, emission=emission),)), vpls=16).radiance
     np.testing.assert_allclose(image / factor, one.render(scene, vpls=16).radiance, rtol=1e-5, atol=1e-8)
 
 

@@ -84,7 +84,7 @@ def test_on_built_in_scenes(renderer, name, projection):
 @pytest.mark.parametrize("kernel", [1.0, 9.0])
 def test_with_a_wide_spotlight(renderer, fov, kernel):
     scene = scene_named("room")
-    scene = replace(scene, spotlight=replace(scene.spotlight, fov=fov))
+    scene = replace(scene, lights=(replace(scene.spotlight, fov=fov),))
     assert_equivalent(*render_both(renderer, scene, {"shadow_maps.spot_kernel": kernel}), hit_pixels("room", scene))
 
 
@@ -101,7 +101,7 @@ def test_with_a_wide_spotlight(renderer, fov, kernel):
 )
 def test_with_a_disc_for_a_spotlight(renderer, fov, settings):
     scene = scene_named("room")
-    scene = replace(scene, spotlight=replace(scene.spotlight, fov=fov, radius=0.15))
+    scene = replace(scene, lights=(replace(scene.spotlight, fov=fov, radius=0.15),))
     assert_equivalent(*render_both(renderer, scene, settings), hit_pixels("room", scene))
 
 

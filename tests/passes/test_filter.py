@@ -11,7 +11,7 @@ from fixed_lights import lit_by, vpl_records
 from small_scenes import build, plane, quad, room, scaled
 
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 
 visibility = import_module("deferred_ir.profiling.checks.visibility")
 

@@ -23,7 +23,7 @@ SETTINGS = {"vpl.count": 24, "shadow_maps.spot_size": 128, "shadow_maps.vpl_size
 def moved(scene, step):
     """The scene with its light a little further."""
     x, y, z = scene.spotlight.position
-    return replace(scene, spotlight=replace(scene.spotlight, position=(x + 0.06 * step, y - 0.02 * step, z)))
+    return replace(scene, lights=(replace(scene.spotlight, position=(x + 0.06 * step, y - 0.02 * step, z)),))
 
 
 @pytest.mark.parametrize("projection", ["perspective", "paraboloid"])
@@ -79,7 +79,7 @@ def test_only_the_spotlights_map_follows_a_light_that_vpls_do_not_notice(rendere
     plan = one.plan(ROOM)
     one.draw(ROOM, plan)
     x, y, z = ROOM.spotlight.position
-    one.draw(replace(ROOM, spotlight=replace(ROOM.spotlight, position=(x, y - 1e-4, z))), plan)
+    one.draw(replace(ROOM, lights=(replace(ROOM.spotlight, position=(x, y - 1e-4, z)),)), plan)
     assert one.executor.counters["maps_drawn"] == 1
 
 
@@ -110,7 +110,7 @@ def test_state_ends_with_scene_and_seed_and_when_the_light_is_off(renderer, chan
     elif change == "seed":
         one.render(ROOM, seed=1)
     else:
-        dark = replace(ROOM, spotlight=replace(ROOM.spotlight, emission=(0.0, 0.0, 0.0)))
+        dark = replace(ROOM, lights=(replace(ROOM.spotlight, emission=(0.0, 0.0, 0.0)),))
         assert one.render(dark).radiance.max() == 0
     assert (one.render(ROOM).radiance == fresh).all()
     assert one.executor.counters["maps_drawn"] <= 9
@@ -172,7 +172,7 @@ def test_direct_light_comes_from_a_map_or_from_rays(renderer):
     [
         (ROOM, (64, 64), True),
         (ROOM, (512, 512), False),
-        (replace(ROOM, spotlight=replace(ROOM.spotlight, radius=0.1)), (96, 64), False),
+        (replace(ROOM, lights=(replace(ROOM.spotlight, radius=0.1),)), (96, 64), False),
         (build(sphere(1.0, 6), plane(9.0, -1.0)), (512, 512), True),
     ],
     ids=["few pixels", "many pixels", "a disc", "many triangles"],

@@ -11,7 +11,7 @@ from small_scenes import build, plane, quad, sphere
 
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 
 SIZE = (96, 72)
 GRAPHS = ("deferred", "forward")
@@ -77,7 +77,7 @@ def test_a_very_narrow_spotlight_keeps_its_soft_edge(renderer):
     """Half a degree, from far above: cosines in single precision would show steps."""
     scene = floor(0.5, height=150.0)
     light = replace(scene.spotlight, position=(0.1, 150.0, 0.2), look_at=(0.0, 0.0, 0.0), emission=(3e4, 3e4, 3e4))
-    scene = replace(scene, spotlight=light, camera=Camera((0.0, 1.5, 0.4), (0.0, 0.0, 0.0), fov=60.0))
+    scene = replace(scene, lights=(light,), camera=Camera((0.0, 1.5, 0.4), (0.0, 0.0, 0.0), fov=60.0))
     radiance = renderer(SIZE, "deferred").render(scene, vpls=0).radiance
     positions, shown = seen(scene)
     expected = spot_radiance(scene, positions)
@@ -166,7 +166,7 @@ def test_light_must_come_from_before_both_the_face_and_its_shading_normal(render
 
     def lit(way):
         position = tuple(3.0 * np.array(way))
-        return one.render(replace(scene, spotlight=Spotlight(position, (0, 0, 0), 60.0)), vpls=0).radiance.max()
+        return one.render(replace(scene, lights=(Spotlight(position, (0, 0, 0), 60.0),)), vpls=0).radiance.max()
 
     assert lit(way) == 0
     assert lit((1, 0.2, 0)) > 0
@@ -238,7 +238,7 @@ def test_an_occluder_shades_a_vpl_where_it_should_in_any_tile(renderer, tmp_path
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_a_light_that_hits_nothing_leaves_the_direct_light(renderer, graph):
     scene = floor()
-    up = replace(scene, spotlight=replace(scene.spotlight, look_at=(0.2, 9.0, -0.3)))
+    up = replace(scene, lights=(replace(scene.spotlight, look_at=(0.2, 9.0, -0.3)),))
     one = renderer(SIZE, graph)
     assert one.render(up, vpls=16).radiance.max() == 0
     assert one.executor.counters["vpls_alive"] == 0
@@ -250,7 +250,7 @@ def test_a_light_on_a_surface_and_a_camera_on_the_light_give_finite_numbers(rend
     scene = floor()
     spot = Spotlight((0.3, 0.0, 0.0), (0.3, -1.0, 0.0), 120.0, (1.0, 1.0, 1.0))
     lights = vpl_records([(0.0, 0.0, 0.0), scene.camera.position], [(0, 1, 0), (0, -1, 0)], [(1, 1, 1)] * 2)
-    there = replace(scene, spotlight=spot)
+    there = replace(scene, lights=(spot,))
     image = lit_by(renderer, tmp_path, lights, SIZE, graph).render(there)
     assert np.isfinite(image.radiance).all()
 
@@ -258,7 +258,7 @@ def test_a_light_on_a_surface_and_a_camera_on_the_light_give_finite_numbers(rend
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_a_light_exactly_where_a_pixel_looks_gives_nothing_instead_of_a_division_by_zero(renderer, tmp_path, graph):
     scene = build(plane(), camera=Camera((0.0, 2.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)))
-    scene = replace(scene, spotlight=Spotlight((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), 120.0, (1.0, 1.0, 1.0)))
+    scene = replace(scene, lights=(Spotlight((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), 120.0, (1.0, 1.0, 1.0)),))
     records = vpl_records([(0, 0, 0)], [(0, 1, 0)], [(1, 1, 1)])
     for size in ((1, 1), (3, 3)):
         image = lit_by(renderer, tmp_path, records, size, graph).render(scene)

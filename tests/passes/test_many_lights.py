@@ -101,7 +101,7 @@ def test_no_vpls_is_the_spotlight_alone(renderer, tmp_path, graph):
 
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_a_dark_spotlight_gives_black_without_drawing_maps(renderer, graph):
-    scene = replace(room(), spotlight=replace(room().spotlight, emission=DARK))
+    scene = replace(room(), lights=(replace(room().spotlight, emission=DARK),))
     one = renderer(SIZE, graph)
     image = one.render(scene, vpls=16)
     assert image.radiance.max() == 0

@@ -109,7 +109,7 @@ def test_it_shows_what_accurate_shows(renderer):
 def test_direct_light_is_that_of_rays(renderer, scene):
     one, other = renderer((64, 48), "resampled"), renderer((64, 48), "mapped", set={"shadow_rays.visibility": "rays"})
     assert_same_but_for_edges(*(made.render(scene, vpls=0).radiance for made in (one, other)))
-    soft = replace(scene, spotlight=replace(scene.spotlight, radius=0.1))
+    soft = replace(scene, lights=(replace(scene.spotlight, radius=0.1),))
     means = [np.mean([made.render(soft, vpls=0, seed=s).radiance for s in range(8)], axis=0) for made in (one, other)]
     assert rel_mse(*means, np.ones((48, 64), bool)) < 1e-3
 
@@ -242,10 +242,10 @@ def views(scene):
     light, camera = scene.spotlight, scene.camera
     yield scene, {}
     yield replace(scene, camera=replace(camera, fov=camera.fov - 5)), {}
-    yield replace(scene, spotlight=replace(light, emission=(3.0, 2.0, 1.0))), {}
-    yield replace(scene, spotlight=replace(light, emission=(3.0, 2.0, 1.0))), {"seed": 2}
-    yield replace(scene, spotlight=replace(light, position=(0.1, 0.8, 0.2))), {"seed": 2}
-    yield replace(scene, spotlight=replace(light, emission=(0.0, 0.0, 0.0))), {}
+    yield replace(scene, lights=(replace(light, emission=(3.0, 2.0, 1.0)),)), {}
+    yield replace(scene, lights=(replace(light, emission=(3.0, 2.0, 1.0)),)), {"seed": 2}
+    yield replace(scene, lights=(replace(light, position=(0.1, 0.8, 0.2)),)), {"seed": 2}
+    yield replace(scene, lights=(replace(light, emission=(0.0, 0.0, 0.0)),)), {}
     yield build(plane()), {}
     yield scene, {}
 
@@ -282,7 +282,7 @@ def test_what_a_scene_does_not_need_is_left_out(renderer):
         *("lights", "vpl", "gbuffer", "direct_rays", "lighting", "tonemap")
     }
     assert same_pixels(one.render(room(), vpls=0), full.render(room(), vpls=0))
-    dark = replace(room(), spotlight=replace(room().spotlight, emission=(0.0, 0.0, 0.0)))
+    dark = replace(room(), lights=(replace(room().spotlight, emission=(0.0, 0.0, 0.0)),))
     assert "direct_rays" in one.plan(dark, 4).left_out
     assert not one.render(dark, vpls=4).radiance.any()
     assert same_pixels(one.render(room(), vpls=4), full.render(room(), vpls=4))

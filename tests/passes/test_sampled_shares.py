@@ -9,7 +9,7 @@ from small_scenes import build, crooked_room, plane, quad, room, smooth_scene
 
 from deferred_ir.base.errors import GraphError
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 
 COUNT = 32
 WHOLE = {"vpl.count": COUNT, "vpl.most": COUNT, "shadow_maps.vpl_size": 64, "direct_rays.visibility": "maps"}
@@ -91,7 +91,7 @@ def test_a_standing_camera_chooses_no_samples_anew(renderer):
     plan, scene = one.plan(room()), room()
     for step in range(3):
         x, y, z = scene.spotlight.position
-        scene = replace(scene, spotlight=replace(scene.spotlight, position=(x + 0.05, y, z)))
+        scene = replace(scene, lights=(replace(scene.spotlight, position=(x + 0.05, y, z)),))
         one.draw(scene, plan)
         assert one.executor.counters["samples"] >= 24 * 16
         assert ({"gbuffer", "sample_pixels", "neighbours"} <= set(one.executor.skipped)) == (step > 0)

@@ -14,7 +14,7 @@ from small_scenes import Mesh, box, build, plane, quad, room, scaled
 from deferred_ir.base.errors import DeviceError, GraphError
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 
 visibility = import_module("deferred_ir.profiling.checks.visibility")
 

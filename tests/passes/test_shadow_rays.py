@@ -54,7 +54,7 @@ def test_sub_buffers_hold_what_the_reference_finds_for_each_share(renderer, n, c
     hits = PathTracer(scene, tracer).trace_camera_rays(SIZE)
     pixel = np.arange(SIZE[0] * SIZE[1])
     hits = hits.rows((SIZE[1] - 1 - pixel // SIZE[0]) * SIZE[0] + pixel % SIZE[0])  # bottom row first
-    vpls = cast(scene.spotlight, tracer, count, "sobol")
+    vpls = cast(scene.emitters, tracer, count, "sobol")
     order, starts = deal(np.arange(len(vpls)), count), find_share_starts(len(vpls), n)
     share, place = find_places(pixel, SIZE, n)
     expected = np.zeros((len(pixel), 3))
@@ -86,7 +86,7 @@ def test_lonely_pixels_ask_the_missing_vpls(renderer):
     image = known + asked
     assert asked.mean() > 0.9 * image.mean()
     hits = PathTracer(scene, one.tracer()).trace_camera_rays(SIZE)
-    expected = irradiance(one.tracer(), hits, cast(scene.spotlight, one.tracer(), 40, "sobol"), clamp=0.0)
+    expected = irradiance(one.tracer(), hits, cast(scene.emitters, one.tracer(), 40, "sobol"), clamp=0.0)
     assert share_off(image, expected.reshape(image.shape), np.ones(image.shape[:2], bool)) < 0.01
 
 
@@ -112,7 +112,7 @@ def test_with_rays_no_light_has_a_map(renderer):
 @pytest.mark.parametrize("radius", [0.0, 0.3])
 @pytest.mark.parametrize("scene", [crooked_room(), smooth_scene()])
 def test_the_spotlight_is_right_pixel_by_pixel(renderer, scene, radius):
-    scene = replace(scene, spotlight=replace(scene.spotlight, radius=radius))
+    scene = replace(scene, lights=(replace(scene.spotlight, radius=radius),))
     one = renderer(SIZE, "mapped", set=RAYS | {"shadow_rays.disc_samples": 64})
     found = one.render(scene, vpls=0, accumulate=4 if radius else 1).radiance
     truth = PathTracer(scene, one.tracer()).estimate_direct(SIZE, 256)

@@ -11,7 +11,7 @@ from distance import rel_mse
 from small_scenes import build, plane, quad, room, scaled
 
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 
 soft_shadows = import_module("deferred_ir.profiling.studies.soft_shadows")
 
@@ -21,7 +21,7 @@ RADIUS = soft_shadows.RADIUS
 
 
 def with_radius(scene, radius):
-    return replace(scene, spotlight=replace(scene.spotlight, radius=radius))
+    return replace(scene, lights=(replace(scene.spotlight, radius=radius),))
 
 
 def sized(scene, factor):
@@ -108,7 +108,7 @@ def test_a_blocker_that_lies_on_the_receiver_has_a_hard_shadow(renderer, graph):
 @pytest.mark.parametrize("radius", [0.9, 10.0, 1e6])
 @pytest.mark.parametrize("fov", [90.0, 175.0])
 def test_a_radius_beyond_the_distance_gives_numbers_between_dark_and_light(renderer, graph, radius, fov):
-    scene = replace(room(), spotlight=replace(room().spotlight, fov=fov))
+    scene = replace(room(), lights=(replace(room().spotlight, fov=fov),))
     image = drawn(renderer, with_radius(scene, radius), graph)
     free = drawn(renderer, scene, graph, **{"shadow_maps.spot_offset": 16.0, "shadow_maps.spot_size": 16})
     assert np.isfinite(image).all()
@@ -119,7 +119,7 @@ def test_a_radius_beyond_the_distance_gives_numbers_between_dark_and_light(rende
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_a_light_on_a_surface_and_maps_of_the_smallest_size_give_finite_numbers(renderer, graph):
     down = Spotlight((0.0, -1.0, 0.0), (0.0, -2.0, 0.0), 120.0, (1.0, 1.0, 1.0), 0.3)
-    for scene in (with_radius(room(), 0.3), replace(room(), spotlight=down)):
+    for scene in (with_radius(room(), 0.3), replace(room(), lights=(down,))):
         assert np.isfinite(drawn(renderer, scene, graph, **{"shadow_maps.spot_size": 16})).all()
 
 

@@ -8,7 +8,7 @@ import pytest
 from small_scenes import box, build, plane, quad, sphere, textured
 
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.truth.metrics import masked_relmse, relmse
 
 edge_mask = import_module("deferred_ir.profiling.sweep.edge_mask")

@@ -9,7 +9,7 @@ import pytest
 from fixed_lights import lit_by, vpl_records
 from small_scenes import box, build, room
 
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.recentre import recentre_geometry
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.reference import trace_reference
@@ -138,7 +138,7 @@ def test_exposure_makes_up_for_any_brightness(renderer, factor: float) -> None:
     scene = room()
     one = renderer((32, 32), set={"vpl.count": 4, "shadow_maps.vpl_size": 64})
     other = replace(
-        scene, spotlight=replace(scene.spotlight, emission=tuple(np.multiply(scene.spotlight.emission, factor)))
+        scene, lights=(replace(scene.spotlight, emission=tuple(np.multiply(scene.spotlight.emission, factor))),)
     )
     plain, found = one.render(scene), one.render(other)
     np.testing.assert_allclose(found.radiance / factor, plain.radiance, rtol=1e-5, atol=1e-9)

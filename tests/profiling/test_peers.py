@@ -447,7 +447,7 @@ def test_an_error_of_a_peers_library_is_one_line(process, capfd):
 def test_a_scene_that_a_peer_cannot_render_is_refused_in_its_words(process):
     scene = room()
     with pytest.raises(peer_process.PeerError, match=r"^fake: has no such light$"):
-        process(replace(scene, spotlight=replace(scene.spotlight, radius=0.1)))
+        process(replace(scene, lights=(replace(scene.spotlight, radius=0.1),)))
 
 
 def test_a_peer_that_hangs_is_ended(process, capfd, monkeypatch):

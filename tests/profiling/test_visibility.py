@@ -13,7 +13,7 @@ from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 from deferred_ir.graph.params import specs
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.scene import Scene
 
 visibility = import_module("deferred_ir.profiling.checks.visibility")
@@ -240,7 +240,7 @@ def test_without_vpls_there_is_the_spotlight_alone():
 
 def test_without_light_there_is_nothing():
     scene = room()
-    assert rows(replace(scene, spotlight=replace(scene.spotlight, emission=(0.0, 0.0, 0.0)))) == {}
+    assert rows(replace(scene, lights=(replace(scene.spotlight, emission=(0.0, 0.0, 0.0)),))) == {}
 
 
 def test_where_no_pixel_faces_a_light_there_are_no_figures():

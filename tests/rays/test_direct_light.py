@@ -12,7 +12,7 @@ from deferred_ir.rays.direct import trace_spotlight
 from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.truth.path_tracer import PathTracer
 
 SIZE = (48, 32)
@@ -20,7 +20,7 @@ SIZE = (48, 32)
 
 def soft(radius=0.3, scene=None):
     scene = room() if scene is None else scene
-    return replace(scene, spotlight=replace(scene.spotlight, radius=radius))
+    return replace(scene, lights=(replace(scene.spotlight, radius=radius),))
 
 
 def lit(scene, *, seed=0, samples=4, block=4, threads=None):

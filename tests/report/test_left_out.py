@@ -51,7 +51,7 @@ def test_filters_without_vpls_are_measured_with_the_bytes_that_they_would_take(r
 
 def test_what_could_not_run_is_told_without_figures(renderer):
     """A dark spotlight needs no maps, and maps of so many VPLs would not fit."""
-    dark = replace(room(), spotlight=replace(room().spotlight, emission=(0.0, 0.0, 0.0)))
+    dark = replace(room(), lights=(replace(room().spotlight, emission=(0.0, 0.0, 0.0)),))
     found, _ = told(renderer, dark, "deferred", **{"vpl.count": 65536})
     assert found["shadow_maps"].why == "no light needs one: the spotlight emits nothing"
     assert found["shadow_maps"].ms is found["shadow_maps"].bytes is None
@@ -107,7 +107,7 @@ def test_the_scene_tells_what_shaders_do_without():
 
     assert words(room()) == {"vertex normals", "vertex colours", "textures", "soft shadows"}
     assert words(smooth_scene()) == {"vertex colours", "textures", "soft shadows"}
-    disc = replace(room(), spotlight=replace(room().spotlight, radius=0.1))
+    disc = replace(room(), lights=(replace(room().spotlight, radius=0.1),))
     assert "soft shadows" not in words(disc)
 
 

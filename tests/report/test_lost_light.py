@@ -7,7 +7,7 @@ from small_scenes import build, plane, room, sphere
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.report import lost_light
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 
 
 def inside_a_sphere():

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from deferred_ir.sampling.warps import build_basis
-from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
+from deferred_ir.scene.lights.spotlight import Spotlight, one_minus_cos
 
 COORDINATE = st.floats(-1, 1)
 

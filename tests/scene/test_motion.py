@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from small_scenes import room
 
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
-from deferred_ir.scene.motion import CameraMotion, KeyframedSpotlight, LissajousMotion, ModelMotion, evaluate_spline
+from deferred_ir.scene.lights.spotlight import Spotlight
+from deferred_ir.scene.motion import CameraMotion, KeyframedLight, LissajousMotion, ModelMotion, evaluate_spline
 
 TIMES = (0.0, 0.5, 2.0, 3.0)
 POSITIONS = ((0.0, 0.0, 0.0), (1.0, -1.0, 0.5), (2.0, 0.0, 0.0), (0.0, 4.0, 1.0))
@@ -28,11 +28,11 @@ def test_the_lissajous_formula(time):
     assert moved.position == pytest.approx(expected)
     assert moved.look_at == (0, -1, 0)
     np.testing.assert_allclose(moved.axis, np.subtract((0, -1, 0), expected) / math.dist((0, -1, 0), expected))
-    assert replace(moved, position=light.position) == light
+    assert replace(moved, position=light.position, motion=light.motion) == light
 
 
 def test_keyframes_hit_the_keys():
-    light = Spotlight((7, 7, 7), (0, 0, 0), motion=KeyframedSpotlight(TIMES, POSITIONS, LOOK_ATS))
+    light = Spotlight((7, 7, 7), (0, 0, 0), motion=KeyframedLight(TIMES, POSITIONS, LOOK_ATS))
     camera = Camera((7, 7, 7), (0, 0, 0), motion=CameraMotion(TIMES, POSITIONS, LOOK_ATS))
     for time, position, look_at in zip(TIMES, POSITIONS, LOOK_ATS, strict=True):
         for moved in (light.at(time), camera.at(time)):
@@ -98,7 +98,7 @@ def test_a_model_with_one_key_stands_there():
 def test_a_scene_moves_its_camera_and_light_only():
     scene = room()
     assert scene.at(2.0) is scene
-    moving = replace(scene, spotlight=replace(scene.spotlight, motion=LissajousMotion((0.1, 0, 0.1), (1, 1))))
+    moving = replace(scene, lights=(replace(scene.spotlight, motion=LissajousMotion((0.1, 0, 0.1), (1, 1))),))
     moved = moving.at(1.0)
     assert moved.geometry is scene.geometry
     assert moved.camera == scene.camera

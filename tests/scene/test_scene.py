@@ -52,7 +52,7 @@ def test_bounds_and_diagonal_are_those_of_what_faces_use():
 def test_facts_say_whether_the_light_shines_and_how_many_triangles_there_are():
     scene = room()
     assert collect_facts(scene) == Facts({EMITS: True, SOFT: False, TRIANGLES: 24})
-    dim, dark = (replace(scene, spotlight=replace(scene.spotlight, emission=(0, 0, e))) for e in (1e-9, 0))
+    dim, dark = (replace(scene, lights=(replace(scene.spotlight, emission=(0, 0, e)),)) for e in (1e-9, 0))
     assert dim.emits
     assert not dark.emits
 
@@ -79,9 +79,9 @@ def changed():
             base, textures=(replace(base.textures[0], pixels=base.textures[0].pixels.reshape(1, 4, 3)),)
         ),
         "the camera": replace(base, camera=replace(camera, fov=camera.fov + 1e-9)),
-        "the light": replace(base, spotlight=replace(light, emission=(3.0, 2.5, 2.1))),
-        "the light's radius": replace(base, spotlight=replace(light, radius=0.1)),
-        "the light's motion": replace(base, spotlight=replace(light, motion=LissajousMotion((1, 1, 1), (1, 1)))),
+        "the light": replace(base, lights=(replace(light, emission=(3.0, 2.5, 2.1)),)),
+        "the light's radius": replace(base, lights=(replace(light, radius=0.1),)),
+        "the light's motion": replace(base, lights=(replace(light, motion=LissajousMotion((1, 1, 1), (1, 1))),)),
         "a model's motion": replace(base, models=(replace(base.models[0], motion=STILL),)),
     }
 

@@ -14,7 +14,7 @@ from deferred_ir.frame.vpl_buffer import BINDING, DEFINES, VPL, VPLS_PER_BLOCK, 
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Output
 from deferred_ir.passes.lights import Lights
-from deferred_ir.scene.lights.spot import one_minus_cos
+from deferred_ir.scene.lights.spotlight import one_minus_cos
 
 
 def fixed_vpls(records: np.ndarray) -> type[Pass]:

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
+from deferred_ir.scene.materials import Material, Texture
 from deferred_ir.scene.motion import ModelMotion
-from deferred_ir.scene.scene import Geometry, Material, Model, Scene, Texture
+from deferred_ir.scene.scene import Geometry, Model, Scene
 
 GREY = (0.5, 0.5, 0.5)
 FAR = (1e5, -2e5, 3e5)
@@ -86,7 +87,7 @@ def build(
         textures=(),
         models=models or (Model("built", 0, int(starts[-1])),),
         camera=camera or Camera((0.0, 2.0, 3.0), (0.0, 0.0, 0.0)),
-        spotlight=spotlight or Spotlight((0.3, 1.5, 0.2), (0.0, 0.0, 0.0), 70.0, (3.0, 2.0, 1.0)),
+        lights=(spotlight or Spotlight((0.3, 1.5, 0.2), (0.0, 0.0, 0.0), 70.0, (3.0, 2.0, 1.0)),),
     )
 
 
@@ -149,14 +150,14 @@ def scaled(scene: Scene, factor: float) -> Scene:
         scene,
         geometry=replace(scene.geometry, positions=scene.geometry.positions * factor),
         camera=replace(scene.camera, position=point(scene.camera.position), look_at=point(scene.camera.look_at)),
-        spotlight=replace(light, position=point(light.position), look_at=point(light.look_at), emission=emission),
+        lights=(replace(light, position=point(light.position), look_at=point(light.look_at), emission=emission),),
     )
 
 
 def move_away(scene: Scene, by: tuple[float, float, float] = FAR) -> Scene:
     """`scene` somewhere else: vertices, camera and light moved by the same vector."""
     geometry = replace(scene.geometry, positions=scene.geometry.positions + by)
-    return replace(scene, geometry=geometry, camera=scene.camera.translate(by), spotlight=scene.spotlight.translate(by))
+    return replace(scene, geometry=geometry, camera=scene.camera.translate(by), lights=(scene.spotlight.translate(by),))
 
 
 def gable() -> Scene:

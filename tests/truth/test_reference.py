@@ -11,7 +11,7 @@ from deferred_ir.base.errors import SettingError
 from deferred_ir.graph.file import load_graph
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.truth.path_tracer import PathTracer
 from deferred_ir.truth.reference import estimate_errors, make_vpl_params, trace_reference
 
@@ -70,7 +70,7 @@ def test_direct_light_on_a_plane_is_the_closed_form(lit_floor, kind):
 
 def test_no_light_arrives_from_behind_a_surface(lit_floor):
     below = replace(lit_floor.spotlight, position=(0.3, -1.2, -0.2))
-    assert not trace_reference(replace(lit_floor, spotlight=below), (8, 8), spp=4).radiance.any()
+    assert not trace_reference(replace(lit_floor, lights=(below,)), (8, 8), spp=4).radiance.any()
 
 
 def test_a_blocker_casts_its_shadow(lit_floor):
@@ -212,7 +212,7 @@ def test_errors_of_a_known_image():
 def test_the_same_image_for_any_number_of_threads(kind, monkeypatch):
     monkeypatch.setattr("deferred_ir.truth.path_tracer.RAYS", 512)
     monkeypatch.setattr("deferred_ir.vpls.ray_sum.PIXELS", 100)
-    scene = replace(room(), spotlight=replace(room().spotlight, radius=0.1))
+    scene = replace(room(), lights=(replace(room().spotlight, radius=0.1),))
     images = [trace_reference(scene, (24, 16), threads=threads, **kind).radiance for threads in (1, 2, 5)]
     np.testing.assert_array_equal(images[0], images[1])
     np.testing.assert_array_equal(images[0], images[2])
@@ -241,7 +241,7 @@ def test_background_is_black_and_not_counted():
 
 
 def test_a_dark_light_gives_a_black_image():
-    scene = replace(room(), spotlight=replace(room().spotlight, emission=(0.0, 0.0, 0.0)))
+    scene = replace(room(), lights=(replace(room().spotlight, emission=(0.0, 0.0, 0.0)),))
     for kind in ({"spp": 4}, {"vpls": 4}):
         assert not trace_reference(scene, (4, 4), **kind).radiance.any()
 

@@ -65,7 +65,7 @@ def test_keys_move_the_light(viewer):
     assert step[0] > 0
     assert np.allclose(step[1:], 0)
     assert np.allclose(light.axis, before.axis)
-    assert np.array_equal(picture(viewer), rendered(replace(cornell(), spotlight=light), set=FEW))
+    assert np.array_equal(picture(viewer), rendered(replace(cornell(), lights=(light,)), set=FEW))
 
 
 def test_the_right_button_moves_the_light(viewer):
@@ -87,7 +87,7 @@ def test_the_light_is_put_at_the_camera_and_seen_from(viewer):
     act(viewer, "key", "v")
     assert session.from_light
     assert session.eye.fov == session.spotlight.fov
-    shown = replace(cornell(), camera=session.eye, spotlight=session.spotlight)
+    shown = replace(cornell(), camera=session.eye, lights=(session.spotlight,))
     assert np.array_equal(picture(viewer), rendered(shown, set=FEW))
 
 

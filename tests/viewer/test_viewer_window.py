@@ -118,7 +118,7 @@ def test_a_frame_shows_all_input_that_came_before_it(viewer):
     assert viewer.frame(0.05)
     step = session.camera.axes @ np.subtract(session.spotlight.position, light.position)
     assert step[0] == pytest.approx(20 * session.scene.geometry.diagonal / 2 / SIZE[1])
-    expected = replace(cornell(), spotlight=session.spotlight)
+    expected = replace(cornell(), lights=(session.spotlight,))
     assert np.array_equal(picture(viewer), rendered(expected, set=FEW))
     act(viewer, "mouseup", 3)
     before = session.camera

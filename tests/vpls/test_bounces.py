@@ -11,7 +11,7 @@ from small_scenes import box, build, room, sphere
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.sampling.patterns import resample_systematically
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.vpls.cast import cast
 
 LIGHT = Spotlight((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), 120.0, (3.0, 2.0, 1.0))
@@ -32,12 +32,12 @@ def sum_bounces(vpls):
 def test_in_a_closed_scene_of_one_albedo_power_is_the_geometric_series():
     scene = build(sphere(subdivisions=4, albedo=(0.6, 0.6, 0.6)), spotlight=LIGHT)
     flat = build(*[strip_normals(sphere(subdivisions=4, albedo=(0.6, 0.6, 0.6)))], spotlight=LIGHT)
-    sums = sum_bounces(cast(LIGHT, Tracer(flat), 256, "sobol", bounces=6))
+    sums = sum_bounces(cast([LIGHT], Tracer(flat), 256, "sobol", bounces=6))
     assert len(sums) == 6
     for one, next_one in pairwise(sums):
         np.testing.assert_allclose(next_one, 0.6 * one, rtol=1e-9)
     # Smooth normals differ from the facets': the series then holds on average only.
-    smooth = sum_bounces(cast(LIGHT, Tracer(scene), 4096, "sobol", bounces=3))
+    smooth = sum_bounces(cast([LIGHT], Tracer(scene), 4096, "sobol", bounces=3))
     np.testing.assert_allclose(smooth[2], 0.36 * smooth[0], rtol=5e-3)
 
 
@@ -47,7 +47,7 @@ def strip_normals(mesh):
 
 def test_fewer_paths_go_on_so_that_each_carries_about_the_same():
     scene = make_closed_box(0.5)
-    vpls = cast(scene.spotlight, Tracer(scene), 512, "sobol", bounces=4)
+    vpls = cast(scene.emitters, Tracer(scene), 512, "sobol", bounces=4)
     starts = [0, *(np.flatnonzero(np.diff(vpls.ray) < 0) + 1), len(vpls)]
     counts = np.diff(starts)
     np.testing.assert_allclose(counts[2] / counts[1], 0.5, atol=0.02)
@@ -56,7 +56,7 @@ def test_fewer_paths_go_on_so_that_each_carries_about_the_same():
 
 def test_the_first_bounce_does_not_depend_on_how_many_follow():
     scene = room()
-    one, four = (cast(scene.spotlight, Tracer(scene), 64, "sobol", 3, bounces=b) for b in (1, 4))
+    one, four = (cast(scene.emitters, Tracer(scene), 64, "sobol", 3, bounces=b) for b in (1, 4))
     np.testing.assert_array_equal(four.emission[: len(one)], one.emission)
     np.testing.assert_array_equal(four.position[: len(one)], one.position)
 
@@ -68,8 +68,8 @@ def test_later_bounces_are_unbiased_where_albedos_differ():
         spotlight=LIGHT,
     )
     tracer = Tracer(red)
-    seconds = np.array([sum_bounces(cast(LIGHT, tracer, 32, "random", seed, bounces=2))[1] for seed in range(200)])
-    firsts = np.array([sum_bounces(cast(LIGHT, tracer, 32, "random", seed, bounces=2))[0] for seed in range(200)])
+    seconds = np.array([sum_bounces(cast([LIGHT], tracer, 32, "random", seed, bounces=2))[1] for seed in range(200)])
+    firsts = np.array([sum_bounces(cast([LIGHT], tracer, 32, "random", seed, bounces=2))[0] for seed in range(200)])
     expected = firsts.mean(axis=0) * (0.9, 0.1, 0.3)
     error = seconds.std(axis=0) / np.sqrt(200)
     assert np.all(np.abs(seconds.mean(axis=0) - expected) < 4 * error + 1e-9)
@@ -77,12 +77,12 @@ def test_later_bounces_are_unbiased_where_albedos_differ():
 
 def test_a_black_scene_ends_the_paths():
     scene = make_closed_box(0.0)
-    assert len(cast(scene.spotlight, Tracer(scene), 16, "sobol", bounces=50)) == 0
+    assert len(cast(scene.emitters, Tracer(scene), 16, "sobol", bounces=50)) == 0
 
 
 def test_white_walls_and_fifty_bounces_stay_finite():
     scene = make_closed_box(1.0)
-    vpls = cast(scene.spotlight, Tracer(scene), 16, "sobol", bounces=50)
+    vpls = cast(scene.emitters, Tracer(scene), 16, "sobol", bounces=50)
     assert np.isfinite(vpls.emission).all()
     luminous = [total @ LUMINANCE for total in sum_bounces(vpls)]
     assert max(luminous) == pytest.approx(min(luminous), rel=1e-6)
@@ -99,7 +99,7 @@ def test_systematic_resampling_draws_each_in_proportion(powers, count, offset):
 def test_rays_of_a_disc_light_start_all_over_it():
     light = Spotlight((0.0, 0.5, 0.0), (0.0, -1.0, 0.0), 60.0, (1.0, 1.0, 1.0), radius=0.3)
     scene = make_closed_box(0.5)
-    point, disc = (cast(lamp, Tracer(scene), 256, "sobol") for lamp in (Spotlight(*make_point_light(light)), light))
+    point, disc = (cast([lamp], Tracer(scene), 256, "sobol") for lamp in (Spotlight(*make_point_light(light)), light))
     assert np.abs(point.position - disc.position).max() > 0.2
     np.testing.assert_allclose(disc.emission.sum(axis=0), point.emission.sum(axis=0), rtol=1e-9)
 

@@ -12,7 +12,7 @@ from deferred_ir.frame.frame import NEAR
 from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces, decode_gbuffer
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.truth.path_tracer import PathTracer
 from deferred_ir.vpls.cast import cast
 from deferred_ir.vpls.clamp_residual import trace_residual
@@ -95,7 +95,7 @@ def test_clamped_vpls_and_the_near_field_are_one_bounce():
     scene, clamp = room(), 0.1
     tracer = Tracer(scene)
     _, hits = find_seen(scene, tracer)
-    vpls = cast(scene.spotlight, tracer, 2048, "sobol")
+    vpls = cast(scene.emitters, tracer, 2048, "sobol")
     limits = VplLimits(clamp * scene.geometry.diagonal)
     clamped = sum_radiance(tracer, hits, vpls, limits).reshape(SIZE[1], SIZE[0], 3)
     found = clamped + trace_near_light(scene, clamp=clamp)
@@ -122,7 +122,7 @@ def test_further_bounces_lose_nothing_either():
 @pytest.mark.slow
 def test_a_disc_light_is_asked_at_its_points():
     scene = room()
-    scene = replace(scene, spotlight=replace(scene.spotlight, position=(-0.4, 0.3, 0.3), radius=0.4))
+    scene = replace(scene, lights=(replace(scene.spotlight, position=(-0.4, 0.3, 0.3), radius=0.4),))
     expected, error = trace_lost_light(scene, clamp=0.2)
     found = np.mean([trace_near_light(scene, clamp=0.2, seed=seed) for seed in range(4)], axis=0)
     np.testing.assert_allclose(found.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), atol=4 * error.max(), rtol=0.015)
@@ -331,7 +331,7 @@ def test_where_nothing_is_clamped_it_is_left_out_and_says_why(setting, renderer,
     one = renderer(SIZE, write_graph(tmp_path), set={setting: 0})
     scene = room()
     assert one.plan(scene, outputs=["radiance"]).left_out["near_field"].startswith("nothing is clamped: vpl.clamp")
-    dark = replace(scene, spotlight=replace(scene.spotlight, emission=(0.0, 0.0, 0.0)))
+    dark = replace(scene, lights=(replace(scene.spotlight, emission=(0.0, 0.0, 0.0)),))
     assert "emits nothing" in one.plan(dark, outputs=["radiance"]).left_out["near_field"]
 
 

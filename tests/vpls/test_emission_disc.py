@@ -10,7 +10,7 @@ from closed_forms import mean_cone_factor
 
 from deferred_ir.sampling.patterns import sample_unit_disc
 from deferred_ir.sampling.warps import build_basis, lift_to_hemisphere, square_to_disc
-from deferred_ir.scene.lights.spot import Spotlight
+from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.vpls.emission_disc import EmissionDisc
 
 FOVS = [0.1, 30.0, 100.0, 160.0, 179.99]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from small_scenes import box, build, plane, room
 
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
+from deferred_ir.scene.lights.spotlight import Spotlight, one_minus_cos
 from deferred_ir.vpls.incremental import IncrementalVpls
 
 ALBEDO = (0.5, 0.25, 0.125)

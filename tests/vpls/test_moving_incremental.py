@@ -14,7 +14,7 @@ from small_scenes import box, build
 
 from deferred_ir.frame.direct_lights import LightVersions, pack_lights
 from deferred_ir.rays.tracer import Tracer
-from deferred_ir.scene.lights.spot import Spotlight, one_minus_cos
+from deferred_ir.scene.lights.spotlight import Spotlight, one_minus_cos
 from deferred_ir.scene.motion import ModelMotion
 from deferred_ir.scene.vertices import transform_points
 from deferred_ir.vpls.incremental import FARTHEST, IncrementalVpls

@@ -25,7 +25,7 @@ def cast_into(scene, count=45, fov=179.9):
     hits = PathTracer(scene, tracer).trace_camera_rays(SIZE)
     rows = np.flatnonzero(hits.hit)
     parts = (getattr(hits, name)[rows].astype(np.float32) for name in ("position", "normal", "shading_normal"))
-    vpls = cast(scene.spotlight, tracer, count, "sobol")
+    vpls = cast(scene.emitters, tracer, count, "sobol")
     limits = VplLimits.from_angle(fov, 0.02 * scene.geometry.diagonal)
     return tracer, Surfaces(rows, *parts), hits.rows(rows), vpls, limits
 

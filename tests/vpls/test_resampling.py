@@ -27,13 +27,13 @@ def make_limits(scene=ROOMS):
 
 
 def cast_candidates(scene=ROOMS, count=1024, seed=0, bounces=1):
-    return cast(scene.spotlight, Tracer(scene), count, "sobol", seed, bounces=bounces)
+    return cast(scene.emitters, Tracer(scene), count, "sobol", seed, bounces=bounces)
 
 
 def choose(scene, count, seed, bounces=1, factor=16):
     """Choose VPLs as a render with `vpl.candidates` does."""
     tracer = Tracer(scene)
-    vpls = cast(scene.spotlight, tracer, count * factor, "sobol", seed, bounces=bounces)
+    vpls = cast(scene.emitters, tracer, count * factor, "sobol", seed, bounces=bounces)
     seen = find_probes(tracer, scene.camera, SIZE, seed)
     return resample(vpls, estimate_effects(tracer, seen, vpls, make_limits(scene)), count, seed)
 

@@ -1,31 +1,48 @@
-"""The spotlight of docs/conventions.md: I(w) = E cos(theta) cone(theta) [W/sr per channel], theta from its axis."""
+"""glTF's punctual spot: constant intensity within an inner cone, smoothly down to 0 at an outer one, no cosine."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from deferred_ir.base.arrays import Array, Vec3, add_vec3
-from deferred_ir.sampling.warps import build_basis, lift_to_hemisphere
-from deferred_ir.scene.lights.base import LightView
-from deferred_ir.scene.motion import SpotlightMotion
+from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.base.colour import LUMINANCE
+from deferred_ir.sampling.warps import disc_to_cone
+from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightView, aim
+from deferred_ir.scene.lights.fields import Fault, PlacedLight
+from deferred_ir.scene.lights.spotlight import one_minus_cos
+from deferred_ir.scene.motion import LightMotion
+
+NARROWEST = 1e-3
+"""Least difference of the cosines of both cones, as in KHR_lights_punctual."""
 
 
 @dataclass(frozen=True)
-class Spotlight:
-    """position, look_at: world space; fov: full opening angle, degrees; emission: E, linear RGB; radius: of a disc."""
+class Spot(PlacedLight):
+    """position, look_at: world space; intensity: W/sr, linear RGB; fov, inner_fov: full opening angles, degrees.
 
+    Its intensity is clamp((cos theta - cos(fov/2)) / max(0.001, cos(inner_fov/2) - cos(fov/2)), 0, 1)^2 of that.
+    """
+
+    kind: ClassVar[str] = "spot"
     position: Vec3
     look_at: Vec3
-    fov: float = 80.0
-    emission: Vec3 = (1.0, 1.0, 1.0)
-    radius: float = 0.0
-    motion: SpotlightMotion | None = None
+    fov: float = 90.0
+    inner_fov: float = 0.0
+    intensity: Vec3 = (1.0, 1.0, 1.0)
+    motion: LightMotion | None = None
+
+    def find_faults(self) -> Iterator[Fault]:
+        """Yield what is wrong with the values."""
+        yield from super().find_faults()
+        yield from self.find_number_faults("fov", 0, 180, " degrees", open_ends=True)
+        yield from self.find_number_faults("inner_fov", 0, 180, " degrees")
+        if isinstance(self.inner_fov, float) and isinstance(self.fov, float) and self.inner_fov > self.fov:
+            yield "inner_fov", f"must not be more than fov, {self.fov:g}, but is {self.inner_fov:g}"
 
     @cached_property
     def axis(self) -> Array:
@@ -34,66 +51,62 @@ class Spotlight:
         unit: Array = axis / np.linalg.norm(axis)
         return unit
 
-    def cone(self, directions: Array) -> Array:
-        """Soft edge clamp(4 (cos theta - cos(fov/2)) / (1 - cos(fov/2)), 0, 1) for unit directions (..., 3).
-
-        1 - cos theta = |w - a|^2 / 2 and 1 - cos(fov/2) = 2 sin^2(fov/4): plain differences cancel for narrow cones.
-        """
-        off_axis = ((directions - self.axis) ** 2).sum(axis=-1) / 2
-        edge = one_minus_cos(self.fov)
-        inside: Array = np.clip(4 * (edge - off_axis) / edge, 0, 1)
-        return inside
+    @property
+    def emission(self) -> Vec3:
+        """Its intensity along its axis."""
+        return self.intensity
 
     @property
     def has_area(self) -> bool:
-        """Whether it is a disc."""
-        return self.radius > 0
+        """It has none."""
+        return False
 
-    def emit(self, points: Array, places: Array | None) -> tuple[Array, Array, Array]:
-        """Return rays that together carry its light: origins and unit directions (n, 3), and what each carries (n, 3).
-
-        points: of the unit disc, (n, 2), which Nusselt's analogue lifts to the cone. places: see `locate`.
-        """
-        reach = np.sin(np.radians(self.fov) / 2)
-        directions = lift_to_hemisphere(points * reach, self.axis[None])
-        carried = np.multiply.outer(self.cone(directions) * reach**2 / len(points), np.asarray(self.emission, float))
-        return self.locate(places, len(points)), directions, carried
-
-    def locate(self, places: Array | None, count: int) -> Array:
-        """Return `count` points on the light, (count, 3). places: on the unit disc, (count, 2); None for its middle."""
-        middle = np.broadcast_to(np.asarray(self.position, float), (count, 3))
-        if places is None:
-            return middle
-        right, up = build_basis(self.axis)
-        return middle + self.radius * (places[:, :1] * right + places[:, 1:] * up)
+    @property
+    def _edges(self) -> tuple[float, float]:
+        """1 - cos of the outer cone's half angle, and how much less that of the inner one is."""
+        outer = one_minus_cos(self.fov)
+        return outer, max(NARROWEST, outer - one_minus_cos(self.inner_fov))
 
     def radiate(self, directions: Array) -> Array:
-        """Return intensity over emission in unit `directions` (n, 3) from the light, (n,)."""
-        intensity: Array = np.maximum(directions @ self.axis, 0) * self.cone(directions)
+        """Return intensity over that along the axis in unit `directions` (n, 3) from the light, (n,)."""
+        outer, soft = self._edges
+        off_axis = ((directions - self.axis) ** 2).sum(axis=-1) / 2
+        intensity: Array = np.clip((outer - off_axis) / soft, 0, 1) ** 2
         return intensity
+
+    def emit(self, points: Array, places: Array | None, bounds: Bounds) -> Flux:
+        """Return rays in the cone, uniform in solid angle."""
+        del places, bounds
+        outer, _ = self._edges
+        directions = disc_to_cone(points, self.axis, outer)
+        carried = np.multiply.outer(self.radiate(directions) * (2 * outer / len(points)), self.intensity)
+        return np.broadcast_to(np.asarray(self.position, float), directions.shape), directions, carried
+
+    def measure_flux(self, bounds: Bounds) -> float:
+        """Return its luminous flux over pi."""
+        del bounds
+        outer, soft = self._edges
+        flat = max(outer - soft, 0.0)  # 1 - cos where it begins to fall
+        ramp = (outer - flat) ** 3 / (3 * soft**2)
+        return float(2 * (flat + ramp) * (LUMINANCE @ np.asarray(self.intensity, float)))
+
+    def sample(self, at: Array, places: Array | None, bounds: Bounds) -> Arrivals:
+        """Return what arrives."""
+        del places, bounds
+        source = np.asarray(self.position, float)
+        to, square = aim(source, at)
+        return Arrivals(to, np.broadcast_to(source, at.shape), self.radiate(-to) / square)
 
     def describe(self) -> Mapping[str, Any]:
         """Return its fields of a LIGHT record."""
-        shape = {"position": self.position, "axis": self.axis, "one_minus_cos": one_minus_cos(self.fov)}
-        return {**shape, "radius": self.radius, "emission": self.emission}
+        outer, soft = self._edges
+        place = {"position": self.position, "axis": self.axis, "emission": self.intensity}
+        return {**place, "one_minus_cos": outer, "soft_edge": soft}
 
-    def list_views(self) -> tuple[LightView, ...]:
+    def list_views(self, bounds: Bounds) -> tuple[LightView, ...]:
         """Return its only view: all of its cone."""
+        del bounds
         return (LightView(self.position, self.axis, self.fov),)
 
-    def at(self, time: float) -> Spotlight:
-        """Return the spotlight where it is at `time` seconds of its motion."""
-        if self.motion is None:
-            return self
-        position, look_at = self.motion.move(self.position, self.look_at, time)
-        return replace(self, position=position, look_at=look_at)
 
-    def translate(self, by: Vec3) -> Spotlight:
-        """Return the spotlight moved by a vector, at rest there."""
-        position, look_at = add_vec3(self.position, by), add_vec3(self.look_at, by)
-        return replace(self, position=position, look_at=look_at, motion=None)
-
-
-def one_minus_cos(fov: float) -> float:
-    """1 - cos(fov/2) for a full opening angle in degrees."""
-    return 2 * math.sin(math.radians(fov) / 4) ** 2
+LIGHT = Spot

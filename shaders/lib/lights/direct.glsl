@@ -12,11 +12,11 @@ struct DirectLight {
 
 layout(std140, binding = LIGHTS_BINDING) uniform Lights { DirectLight lights[LIGHTS_PER_BLOCK]; };
 
-#include "lib/lights/spot.glsl"
+#include "lib/lights/kinds/spotlight.glsl"
 
 // The only place that tells kinds of lights apart: irradiance over emission.
 float light_strength(DirectLight light, vec3 position, vec3 normal, vec3 shading_normal) {
-    return spot_strength(light, position, normal, shading_normal);
+    return spotlight_strength(light, position, normal, shading_normal);
 }
 
 vec3 light_irradiance(DirectLight light, vec3 position, vec3 normal, vec3 shading_normal) {

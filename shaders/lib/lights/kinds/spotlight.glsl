@@ -1,9 +1,9 @@
-// Irradiance from a spotlight (deferred_ir/scene/lights/spot.py). lib/lights/direct.glsl, which includes this file,
+// Irradiance from a spotlight (deferred_ir/scene/lights/spotlight.py). lib/lights/direct.glsl, which includes this file,
 // declares the record.
 
 // I(w) = E cos(theta) cone(theta), cone = clamp(4 (cos theta - cos(fov/2)) / (1 - cos(fov/2)), 0, 1). Returns
 // the irradiance over E.
-float spot_strength(DirectLight light, vec3 position, vec3 normal, vec3 shading_normal) {
+float spotlight_strength(DirectLight light, vec3 position, vec3 normal, vec3 shading_normal) {
     vec3 to = light.position - position;
     float inverse_square = 1.0 / max(dot(to, to), TINY);
     float inverse = sqrt(inverse_square);

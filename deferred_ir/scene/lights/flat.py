@@ -1,0 +1,81 @@
+"""What lights share that are a part of a plane: one-sided, with constant radiance."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+
+from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.base.colour import LUMINANCE
+from deferred_ir.sampling.warps import lift_to_hemisphere, square_to_disc
+from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples, aim
+from deferred_ir.scene.lights.fields import Fault, PlacedLight
+
+
+class FlatLight(PlacedLight):
+    """A part of the plane through `position` that faces `look_at`."""
+
+    at_infinity: ClassVar[bool] = False
+    look_at: Vec3
+    radiance: Vec3
+
+    @property
+    @abstractmethod
+    def area(self) -> float:
+        """Its area, square scene units."""
+
+    @abstractmethod
+    def locate(self, places: Array) -> Array:
+        """Return points on it, (n, 3), evenly spread as `places` (n, 2) of the unit disc are."""
+
+    def find_faults(self) -> Iterator[Fault]:
+        """Yield what is wrong with the values."""
+        yield from super().find_faults()
+
+    @cached_property
+    def axis(self) -> Array:
+        """Unit normal of the side that shines, float64 (3,)."""
+        axis = np.subtract(self.look_at, self.position).astype(np.float64)
+        unit: Array = axis / np.linalg.norm(axis)
+        return unit
+
+    @property
+    def emission(self) -> Vec3:
+        """Its radiance."""
+        return self.radiance
+
+    @property
+    def has_area(self) -> bool:
+        """It has."""
+        return True
+
+    def emit(self, points: Array, places: Array | None, bounds: Bounds) -> Flux:
+        """Return rays that leave places on it, cosine-distributed."""
+        del bounds
+        assert places is not None
+        carried = np.asarray(self.radiance, float) * (self.area / len(points))
+        return self.locate(places), lift_to_hemisphere(points, self.axis[None]), np.tile(carried, (len(points), 1))
+
+    def measure_flux(self, bounds: Bounds) -> float:
+        """Return its luminous flux over pi."""
+        del bounds
+        return float(self.area * (LUMINANCE @ np.asarray(self.radiance, float)))
+
+    def spread(self, square: Array, bounds: Bounds) -> LightSamples:
+        """Return points on it, all with the same part of its light."""
+        del bounds
+        each = np.asarray(self.radiance, float) * (self.area / len(square))
+        normals = np.tile(self.axis, (len(square), 1))
+        return LightSamples(self.locate(square_to_disc(square)), normals, np.tile(each, (len(square), 1)))
+
+    def sample(self, at: Array, places: Array | None, bounds: Bounds) -> Arrivals:
+        """Return what arrives from a place on it."""
+        del bounds
+        assert places is not None
+        source = self.locate(places)
+        to, square = aim(source, at)
+        return Arrivals(to, source, self.area * np.maximum(-(to @ self.axis), 0) / square)

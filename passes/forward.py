@@ -13,10 +13,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from deferred_ir.base.arrays import Ints
+from deferred_ir.frame.direct_lights import LIGHTS_PER_BLOCK
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
+from deferred_ir.gl.shaders import Define
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
@@ -76,22 +78,27 @@ class Forward(Pass):
         self._draw_lights(frame, io, defines, compare)
         self._draw_vpls(frame, io, defines, compare)
 
-    def _draw_lights(self, frame: Frame, io: Io, defines: Mapping[str, int | float], compare: Any) -> None:
-        lights, views = io["lights"], io["views"]
-        lights.bind()
-        if views:
-            views.bind()
+    def _draw_lights(self, frame: Frame, io: Io, defines: Mapping[str, Define], compare: Any) -> None:
+        lights, views, described = io["lights"], io["views"], frame.light_views
         variant = shader_variants.choose_for_lights(frame, lights.records, views.records if views else None)
         program = io.program("forward.frag", "scene.vert", defines={"DIRECT": 1, **defines, **variant})
-        for number, light in enumerate(lights.records):
-            if io["light_maps"]:
-                io["light_maps"][int(light["view"])].bind(FIRST_MAP, compare)
-            if io["blockers"]:
-                io["blockers"][int(light["view"])].bind(FIRST_MAP + 1, io.gpu.sampler(linear=False))
-            program.set(number=number)
-            frame.buffers.draw(program)
+        lit = find_shining(lights.records)
+        for number in np.flatnonzero(lit).tolist():
+            block, own = divmod(number, LIGHTS_PER_BLOCK)
+            lights.bind(block)
+            program.set(number=own)
+            if views is None:
+                frame.buffers.draw(program)
+                continue
+            views.bind(block)
+            for view in np.flatnonzero(described.owners == number).tolist():
+                io["light_maps"][view].bind(FIRST_MAP, compare)
+                if io["blockers"]:
+                    io["blockers"][view].bind(FIRST_MAP + 1, io.gpu.sampler(linear=False))
+                program.set(view_number=int(described.rows[view]) % views.description.block)
+                frame.buffers.draw(program)
 
-    def _draw_vpls(self, frame: Frame, io: Io, defines: Mapping[str, int | float], compare: Any) -> None:
+    def _draw_vpls(self, frame: Frame, io: Io, defines: Mapping[str, Define], compare: Any) -> None:
         vpls, group = io["vpls"], self.params.lights_per_draw
         variant = shader_variants.choose_for_pixels(frame, vpls.records)
         program = io.program("forward.frag", "scene.vert", defines={"DIRECT": 0, "DISC": 0, **defines, **variant})

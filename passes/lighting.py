@@ -46,7 +46,7 @@ class Lighting(Pass):
         "normals": Input("shading and geometric normal", format="rgba16"),
         "albedo": Input("reflectance", format="rgba16f"),
         "tiles": Input("which VPLs may light which tiles of the screen", format="rg32ui", optional=True),
-        "spotlight": Input("irradiance from the spotlight over its emission, instead of a map", "r32f", optional=True),
+        "direct": Input("light of the direct lights, instead of their maps", optional=True),
         "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
         "indirect": Input("irradiance from the VPLs, instead of adding them up", format="rgba32f", optional=True),
         "layout": Input("where samples stand, if `indirect` is theirs", format="layout", optional=True),
@@ -54,7 +54,7 @@ class Lighting(Pass):
         "lonely": Input("irradiance of lonely pixels that the filter has left out", format="rgba32f", optional=True),
         "views": Input("where the direct lights' maps are", format="view", optional=True),
         "shadows": Input("shadow atlas", format="depth32f", optional=True, linear=True, compare=">="),
-        "blockers": Input("the same maps: what hides a part of the spotlight's disc", format="depth32f", optional=True),
+        "blockers": Input("the same maps: what hides a part of a light", format="depth32f", optional=True),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
@@ -72,13 +72,10 @@ class Lighting(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Draw the frame once for each block of VPLs."""
-        lights, vpls = io["lights"], io["vpls"].records
-        lights.bind()
-        if io["views"]:
-            io["views"].bind()
+        lights, vpls = io["lights"].records, io["vpls"].records
         views = io["views"].records if io["views"] else None
         defines = shader_variants.choose_for_pixels(frame, vpls) | self.params.defines()
-        defines |= shader_variants.choose_for_lights(frame, lights.records, views)
+        defines |= shader_variants.choose_for_lights(frame, lights, views)
         culled = io["tiles"] is not None and not frame.keep_all
         program = io.program("lighting.frag", defines=defines | {"HAS_TILES": int(culled)})
         io.gpu.ctx.blend_func = io.gpu.ctx.ONE, io.gpu.ctx.ONE
@@ -86,39 +83,58 @@ class Lighting(Pass):
             vpls = vpls[:0]
             if io["blend"]:
                 program.set(offset=read_layout(io).offset)
+        draws = _Draws(io, program)
+        if not culled:
+            lit = vpls[find_shining(vpls)]
+            if len(lit) < len(vpls):
+                draws.pack(lit)
+            vpls = lit
+        draws.run(len(vpls))
         if culled:
-            self._draw_culled(io, program, len(vpls))
-        else:
-            self._draw_shining(io, program, vpls)
+            io.count(LIGHTS_SKIPPED.name, TILES**2 * len(vpls) - count_pairs(io["tiles"].read()))
 
-    def _draw_culled(self, io: Io, program: Program, count: int) -> None:
-        """Draw each block of the `count` VPLs; pixels take those of their tile."""
-        for block in range(max(-(-count // VPLS_PER_BLOCK), 1)):
-            io["vpls"].bind(block)
-            program.set(block=block)
-            self._draw(io, program, first=block == 0, count=min(count - block * VPLS_PER_BLOCK, VPLS_PER_BLOCK))
-        io.count(LIGHTS_SKIPPED.name, TILES**2 * count - count_pairs(io["tiles"].read()))
 
-    def _draw_shining(self, io: Io, program: Program, vpls: np.ndarray) -> None:
-        """Draw the VPLs that have power, block by block."""
-        lit = vpls[find_shining(vpls)]
-        blocks = max(-(-len(lit) // VPLS_PER_BLOCK), 1)
-        packed = np.zeros(blocks * VPLS_PER_BLOCK, VPL)
-        packed[: len(lit)] = lit
-        buffer = io.gpu.uniforms(packed.tobytes()) if len(lit) < len(vpls) else None
-        for start in range(0, max(len(lit), 1), VPLS_PER_BLOCK):
-            if buffer:
-                buffer.bind_to_uniform_block(BINDING, offset=start * VPL.itemsize, size=VPLS_PER_BLOCK * VPL.itemsize)
+class _Draws:
+    """The draws of a frame, each of a block of lights and a block of VPLs; the first is not blended."""
+
+    def __init__(self, io: Io, program: Program) -> None:
+        self._io, self._program, self._packed = io, program, None
+        lights, size = io["lights"].records, io["lights"].description.block
+        ends = [_count_shining(lights[start : start + size]) for start in range(0, len(lights), size)]
+        self._lights = [(block, end) for block, end in enumerate(ends) if end]
+
+    def pack(self, vpls: np.ndarray) -> None:
+        """Take VPL records (n,) instead of those of the buffer."""
+        packed = np.zeros(max(-(-len(vpls) // VPLS_PER_BLOCK), 1) * VPLS_PER_BLOCK, VPL)
+        packed[: len(vpls)] = vpls
+        self._packed = self._io.gpu.uniforms(packed.tobytes())
+
+    def run(self, count: int) -> None:
+        """Draw `count` VPLs, and all lights."""
+        io, program = self._io, self._program
+        blocks = -(-count // VPLS_PER_BLOCK)
+        for number in range(max(blocks, len(self._lights), 1)):
+            light_block, direct = self._lights[number] if number < len(self._lights) else (0, 0)
+            io["lights"].bind(light_block)
+            if io["views"]:
+                io["views"].bind(light_block)
+            block = number if number < blocks else 0
+            if self._packed:
+                nbytes = VPLS_PER_BLOCK * VPL.itemsize
+                self._packed.bind_to_uniform_block(BINDING, offset=block * nbytes, size=nbytes)
             else:
-                io["vpls"].bind(start // VPLS_PER_BLOCK)
-            self._draw(io, program, first=start == 0, count=min(len(lit) - start, VPLS_PER_BLOCK))
+                io["vpls"].bind(block)
+            if number:
+                io.gpu.ctx.enable(io.gpu.ctx.BLEND)
+            here = min(count - block * VPLS_PER_BLOCK, VPLS_PER_BLOCK) if number < blocks else 0
+            program.set(first=number == 0, light_count=direct, count=here, block=block)
+            program.draw_fullscreen()
 
-    def _draw(self, io: Io, program: Program, *, first: bool, count: int) -> None:
-        """Draw `count` VPLs of the bound block. The first draw of a pixel adds the direct lights; later draws blend."""
-        if not first:
-            io.gpu.ctx.enable(io.gpu.ctx.BLEND)
-        program.set(direct=len(io["lights"].records) if first else 0, count=count)
-        program.draw_fullscreen()
+
+def _count_shining(lights: np.ndarray) -> int:
+    """Return how many of the LIGHT records (n,) must be looped over: up to the last that has power."""
+    lit = np.flatnonzero(find_shining(lights))
+    return int(lit[-1]) + 1 if len(lit) else 0
 
 
 PASS = Lighting

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from deferred_ir.frame.direct_lights import LightVersions, describe_output, find_view_owners, pack_lights
+from deferred_ir.base.arrays import Bools
+from deferred_ir.frame.direct_lights import LightVersions, describe_output, list_kinds, pack_lights
+from deferred_ir.frame.facts import DIRECT_LIGHTS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import AXES, LIGHTS_DROPPED, find_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.vpl_buffer import make_axes
+from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Output
-from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.lights.base import LightView
 
 
 class Lights(Pass):
@@ -25,7 +28,12 @@ class Lights(Pass):
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """One buffer."""
         del inputs
-        return {"lights": describe_output()}
+        return {"lights": describe_output(1)}
+
+    def outputs_for(self, facts: Facts, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """One buffer, for as many lights as the scene has."""
+        del inputs
+        return {"lights": describe_output(facts[DIRECT_LIGHTS])}
 
     def depends(self) -> frozenset[str]:
         """The lights, and the models, which may move in front of them."""
@@ -33,26 +41,29 @@ class Lights(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Pack and upload."""
-        records = pack_lights(frame.scene)
+        described = frame.light_views
+        records = pack_lights(frame.scene, described, list_kinds(frame.scene, every=frame.keep_all))
         versions = io.state.update(records, frame.scene)
         if frame.by_view and find_shining(records).any():
-            seen, owners = frame.seen_clusters.find_reaching(_list_cones(frame.scene)), find_view_owners(frame.scene)
             reaches = np.ones(len(records), bool)  # without views nothing is known
-            reaches[owners] = False
-            reaches[owners[seen]] = True
+            reaches[described.owners] = False
+            reaches[described.owners[_find_reaching(frame, described.views)]] = True
             records["emission"][~reaches] = 0
             io.count(LIGHTS_DROPPED.name, int((~reaches).sum()))
         io["lights"].write(records, versions)
 
 
-def _list_cones(scene: Scene) -> np.ndarray:
-    """Return the pyramids about what the lights' views cover, AXES (m,)."""
-    views = [view for light in scene.direct_lights for view in light.list_views(scene.bounds)]
+def _find_reaching(frame: Frame, views: Sequence[LightView]) -> Bools:
+    """Return which views may show something that the camera sees, bool (m,); parallel ones show everything."""
     cones = np.zeros(len(views), AXES)
+    pointed = np.array([view.fov > 0 for view in views], bool)
     for cone, view in zip(cones, views, strict=True):
-        cone["position"] = view.position
-        cone["x_axis"], cone["y_axis"], cone["z_axis"] = (axis[0] for axis in make_axes(view.axis[None], view.fov))
-    return cones
+        if view.fov > 0:
+            cone["position"] = view.position
+            cone["x_axis"], cone["y_axis"], cone["z_axis"] = (a[0] for a in make_axes(view.axis[None], view.fov))
+    reaches = np.ones(len(views), bool)
+    reaches[pointed] = frame.seen_clusters.find_reaching(cones[pointed])
+    return reaches
 
 
 PASS = Lights

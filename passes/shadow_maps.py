@@ -1,9 +1,9 @@
 """Shadow maps of all lights in one depth texture array: lights, vpls -> atlas, views.
 
-Each view of a direct light has a layer of the atlas, each VPL a tile on the layers behind these. The pass plans a
-sub-pass for each map. It draws the dirty maps of a block of VPLs by one indirect call, in which each cluster of
-triangles has an instance for every view that may see it: the vertex shader chooses layer and tile, and four clip
-distances clip to the tile.
+The views of direct lights have the first layers of the atlas, each VPL a tile on the layers behind these. The pass
+plans a sub-pass for each map. It draws the dirty maps of a block of VPLs or of views by one indirect call, in which
+each cluster of triangles has an instance for every view that may see it: the vertex shader chooses layer and tile, and
+four clip distances clip to the tile.
 """
 
 from __future__ import annotations
@@ -13,19 +13,21 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from deferred_ir.base.arrays import Ints
 from deferred_ir.frame.cluster_buffers import ClusterBuffers
-from deferred_ir.frame.direct_lights import find_view_owners
-from deferred_ir.frame.facts import EMITS
+from deferred_ir.frame.facts import DIRECT_LIGHTS, EMITS, VIEWS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.graph.facts import Facts, Statements
+from deferred_ir.graph.facts import NOTHING_KNOWN, Facts, Statements
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.shadows import figures, mesh_choice
 from deferred_ir.shadows.atlas_cache import AtlasCache
-from deferred_ir.shadows.paraboloid import MapBatch, draw_curved
+from deferred_ir.shadows.batches import make_batches
+from deferred_ir.shadows.layout import explain_resolution, lay_out
+from deferred_ir.shadows.paraboloid import draw_curved
 from deferred_ir.shadows.settings import SPOT_MAP, MapParams
-from deferred_ir.shadows.views import CAPACITY, describe_output, pack_views
+from deferred_ir.shadows.views import PARABOLOID, describe_output, pack_views, place_views
 
 
 class ShadowMaps(Pass):
@@ -38,7 +40,7 @@ class ShadowMaps(Pass):
         "lights": Input("the direct lights to draw maps for", format="light"),
         "vpls": Input("the VPLs to draw maps for", format="vpl"),
         "rays": Input("which lights are seen, by rays: then none needs a map", optional=True, replaces=True),
-        "spotlight": Input("the spotlight's light, by rays: then it needs no map", format="r32f", optional=True),
+        "direct": Input("the direct lights' light, by rays: then they need no maps", optional=True),
     }
 
     def _tiles_per_layer(self) -> int:
@@ -50,19 +52,23 @@ class ShadowMaps(Pass):
         return edge
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Return what one spotlight needs."""
+        return self.outputs_for(NOTHING_KNOWN, inputs)
+
+    def outputs_for(self, facts: Facts, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """The atlas, as large as the lights need, and the views of the direct lights."""
         vpls, edge, per_layer = _count_vpls(inputs), self._edge(), self._tiles_per_layer()
-        layers = CAPACITY + -(-vpls // per_layer)
-        layer = 4 * edge * edge
-        self.params.check_budget(vpls, layers * layer, (self.params.budget * 2**20 // layer - CAPACITY) * per_layer)
-        self.params.check_layers(vpls, layers, per_layer)
-        defines = {**self.params.defines(), "ATLAS_SIZE": edge, "FIRST_TILE_LAYER": CAPACITY}
+        first = lay_out(facts[VIEWS], self.params, edge).layers
+        layers, layer = first + -(-vpls // per_layer), 4 * edge * edge
+        self.params.check_budget(vpls, layers * layer, (self.params.budget * 2**20 // layer - first) * per_layer)
+        self.params.check_layers(vpls, layers, per_layer, first)
+        defines = {**self.params.defines(), "ATLAS_SIZE": edge, "FIRST_TILE_LAYER": first}
         larger = "spot_size" if edge == self.params.spot_size else "vpl_size"
         atlas = Texture(
-            "depth32f", size=(edge, edge), layers=layers, grows=True, mend=f"a smaller shadow_maps.{larger}"
+            "depth32f", size=(edge, edge), layers=max(layers, 1), grows=True, mend=f"a smaller shadow_maps.{larger}"
         )
-        doc = "reversed depth; layer 0 the spotlight's, then tiles of VPLs"
-        return {"atlas": Output(doc, atlas, defines), "views": describe_output()}
+        doc = "reversed depth; first layers the direct lights', then tiles of VPLs"
+        return {"atlas": Output(doc, atlas, defines), "views": describe_output(facts[DIRECT_LIGHTS], len(facts[VIEWS]))}
 
     def state_facts(self, facts: Facts) -> Statements:
         """State that the spotlight may have a map."""
@@ -70,13 +76,13 @@ class ShadowMaps(Pass):
         return {SPOT_MAP: True}
 
     def unneeded(self, facts: Facts) -> str | None:
-        """Return a reason if the spotlight is dark: then there are no VPLs either."""
-        return None if facts[EMITS] else "no light needs one: the spotlight emits nothing"
+        """Return a reason if nothing shines: then there are no VPLs either."""
+        return None if facts[EMITS] else "no light needs one: nothing shines"
 
     def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
         """Return what maps cannot resolve."""
-        del facts, inputs
-        return "shadows are as fine as the maps' texels"
+        del inputs
+        return explain_resolution(facts[VIEWS], self.params, self._edge())
 
     def depends(self) -> frozenset[str]:
         """The lights and the models; VPLs come as an input."""
@@ -87,53 +93,61 @@ class ShadowMaps(Pass):
     ) -> Sequence[Mapping[str, Any]]:
         """Return a sub-pass for each map that the buffers have room for; after a frame, for each of its lights."""
         per_layer, why = self._tiles_per_layer(), "no frame has drawn it yet"
-        spot = {"light": "spotlight", "projection": "perspective", "layer": 0, "tile": 0, "size": self.params.spot_size}
+        layout, lights = state.layout if state else None, inputs["lights"]
+        layout = layout or lay_out(
+            [0] * (lights.records if isinstance(lights, Buffer) else 1), self.params, self._edge()
+        )
+        names = state.names if state and state.names else ["spotlight"] * len(layout.sizes)
+        views = [
+            {"light": name, "projection": "perspective", "layer": layer, "tile": 0, "corner": (x, y), "size": size}
+            for name, (layer, x, y), size in zip(names, layout.places, layout.sizes, strict=True)
+        ]
         tiles = [
-            {"light": f"vpl {i}", "projection": self.params.projection, "layer": CAPACITY + i // per_layer}
+            {"light": f"vpl {i}", "projection": self.params.projection, "layer": layout.layers + i // per_layer}
             | {"tile": i % per_layer, "size": self.params.vpl_size}
             for i in range(_count_vpls(inputs))
         ]
-        parts = [{**tile, "state": "dirty", "why": why} for tile in [spot, *tiles]]
+        parts = [{**tile, "state": "dirty", "why": why} for tile in [*views, *tiles]]
         if state and state.frame:
             return state.describe(parts)
-        return parts[1:] if inputs["spotlight"] else parts
+        return parts[len(views) :] if inputs["direct"] else parts
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Clear and draw the maps that the atlas does not hold already."""
-        views, vpls = pack_views(frame, self.params, self._edge()), io["vpls"].records
-        io["views"].write(views)
-        owners = find_view_owners(frame.scene)[: 0 if io["spotlight"] else None]
-        maps = AtlasCache.begin(io, self.params, owners, all_tiles=frame.keep_all)
+        described, vpls = frame.light_views, io["vpls"].records
+        layout = lay_out([view.halvings for view in described.views], self.params, self._edge())
+        views = pack_views(frame, described, layout, self._edge())
+        block = io["views"].description.block
+        placed = place_views(views, described.rows, block)
+        io["views"].write(placed)
+        used = 0 if io["direct"] else len(views)
+        io.state.names = [frame.scene.direct_lights[owner].kind for owner in described.owners]
+        maps = AtlasCache.begin(io, self.params, described.owners[:used], layout, all_tiles=frame.keep_all)
         self.params.prepare(io.gpu)
-        io["views"].bind()
-        for curved in (False, True):
-            drawn = views[: len(owners)]
-            chosen = np.flatnonzero(maps.dirty[: len(drawn)] & ((drawn["paraboloid"] > 0) == curved))
-            batch = MapBatch(views, chosen, self.params.spot_size, vpls=False, curved=curved)
-            self._draw(frame.buffers.cluster_buffers, io, batch)
+        for start in range(0, len(placed) if used else 0, block):
+            io["views"].bind(start // block)
+            here = np.flatnonzero(maps.dirty[:used] & (described.rows[:used] // block == start // block))
+            self._draw(frame.buffers.cluster_buffers, io, placed[start : start + block], described.rows[here] - start)
         if len(vpls):
-            mesh, curved = mesh_choice.choose_mesh(frame, self.params), self.params.projection == "paraboloid"
-            block, dirty = io["vpls"].description.block, maps.dirty[len(owners) :]
+            mesh = mesh_choice.choose_mesh(frame, self.params)
+            block, dirty = io["vpls"].description.block, maps.dirty[used:]
             for start in range(0, len(vpls), block):
                 io["vpls"].bind(start // block)
-                chosen = np.flatnonzero(dirty[start : start + block])
-                records = vpls[start : start + block]
-                self._draw(mesh, io, MapBatch(records, chosen, self.params.vpl_size, vpls=True, curved=curved))
+                self._draw(mesh, io, vpls[start : start + block], np.flatnonzero(dirty[start : start + block]))
             mesh_choice.report_size(frame, io, self.params)
         io.state.remember()
         io.count(figures.MAPS_DRAWN.name, int(maps.dirty.sum()))
 
-    def _draw(self, mesh: ClusterBuffers, io: Io, batch: MapBatch) -> None:
-        """Draw `mesh` into the maps of `batch`."""
-        if not len(batch.chosen):
-            return
-        if batch.curved:
-            draw_curved(mesh, io, self.params, batch, layered=True)
-            return
-        geometry = [] if io.gpu.layer_from_vertex else ["shadow_maps/layer.geom"]
-        program = io.program("shadow_maps/depth.frag", "shadow_maps/planar.vert", *geometry, defines=batch.defines)
-        io.gpu.clip(4)
-        mesh.draw(program, mesh.clusters.find_visible(batch.records[batch.chosen]), batch.chosen)
+    def _draw(self, mesh: ClusterBuffers, io: Io, records: np.ndarray, chosen: Ints) -> None:
+        """Draw `mesh` into the maps of the rows `chosen` of the bound block of views or VPLs, `records`."""
+        for batch in make_batches(records, chosen, self.params):
+            if batch.projection == PARABOLOID:
+                draw_curved(mesh, io, self.params, batch, layered=True)
+                continue
+            geometry = [] if io.gpu.layer_from_vertex else ["shadow_maps/layer.geom"]
+            program = io.program("shadow_maps/depth.frag", "shadow_maps/planar.vert", *geometry, defines=batch.defines)
+            io.gpu.clip(4)
+            mesh.draw(program, batch.find_visible(mesh.clusters), batch.chosen)
 
 
 def _count_vpls(inputs: Mapping[str, Description | None]) -> int:

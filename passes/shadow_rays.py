@@ -1,7 +1,7 @@
-"""Find by shadow rays which lights each pixel sees: vpls, G-buffer -> masks, one bit a VPL of its share; spotlight.
+"""Find by shadow rays which lights each pixel sees: vpls, G-buffer -> masks, one bit a VPL of its share; direct.
 
 Interleaved, a pixel asks so few VPLs that on the CPU exact rays can cost less than a map of the whole scene for each.
-The G-buffer is read back, Embree traces, and the answers go up. The spotlight is asked, too: no light needs a map.
+The G-buffer is read back, Embree traces, and the answers go up. Direct lights are asked, too: no light needs a map.
 """
 
 from __future__ import annotations
@@ -12,15 +12,16 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from deferred_ir.frame.facts import EMITS
+from deferred_ir.frame.direct_lights import describe_direct
+from deferred_ir.frame.facts import DIRECT_LIGHTS, EMITS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.vpl_buffer import read_limits, read_vpls
-from deferred_ir.graph.facts import Facts
+from deferred_ir.graph.facts import NOTHING_KNOWN, Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
-from deferred_ir.rays.direct import trace_spotlight
+from deferred_ir.rays.direct import trace_direct
 from deferred_ir.rays.pixel_surfaces import PixelJob
 from deferred_ir.vpls.interleaving import find_places, find_share_starts
 from deferred_ir.vpls.ray_masks import BITS, trace_masks
@@ -37,12 +38,12 @@ class Params:
         16,
         lo=1,
         hi=64,
-        doc="By rays: points of the spotlight's disc that a pixel traces rays to, where the spotlight has a radius.",
+        doc="By rays: points that a pixel traces rays to, of a direct light that has an area.",
     )
 
 
 class ShadowRays(Pass):
-    """Which VPLs of its share a pixel sees, and how the spotlight lights it."""
+    """Which VPLs of its share a pixel sees, and how the direct lights light it."""
 
     Params = Params
     inputs: ClassVar[Mapping[str, Input]] = {
@@ -52,21 +53,24 @@ class ShadowRays(Pass):
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Return masks, with a layer for each 32 VPLs of a share, and the spotlight's light."""
+        """Return what one spotlight needs."""
+        return self.outputs_for(NOTHING_KNOWN, inputs)
+
+    def outputs_for(self, facts: Facts, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Return masks, with a layer for each 32 VPLs of a share, and the direct light."""
         vpls = inputs["vpls"]
         assert isinstance(vpls, Buffer)
         layers = max(-(-vpls.records // (vpls.parts * BITS)), 1)
         doc = "bit b of layer w: whether the pixel sees VPL 32 w + b of its share; in sub-buffers"
-        direct = "irradiance from the spotlight over its emission, shadows included; 0 on the background"
         return {
             "masks": Output(doc, Texture("r32ui", layers=layers), attach=False),
-            "spotlight": Output(direct, Texture("r32f"), attach=False),
+            "direct": describe_direct(facts[DIRECT_LIGHTS]),
         }
 
     def unneeded(self, facts: Facts) -> str | None:
         """Leave the pass out where maps are chosen."""
         if not facts[EMITS]:
-            return "the spotlight emits nothing"
+            return "nothing shines"
         return "visibility is 'maps'" if self.params.visibility == "maps" else None
 
     def depends(self) -> frozenset[str]:
@@ -88,8 +92,7 @@ class ShadowRays(Pass):
             image[: len(words), place] = words
         io["masks"].upload(image.reshape(-1, height, width, 1))
         job = PixelJob(tracer, seen, frame.size, n, frame.seed)
-        direct = trace_spotlight(job, samples=self.params.disc_samples)
-        io["spotlight"].upload(direct[..., None])
+        io["direct"].upload(trace_direct(job, samples=self.params.disc_samples))
 
 
 PASS = ShadowRays

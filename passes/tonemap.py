@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, get_args
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.fullscreen import FullscreenPass
+from deferred_ir.gl.shaders import Define
 from deferred_ir.graph.params import param
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 
@@ -48,7 +49,7 @@ class Tonemap(FullscreenPass):
         """Nothing of the frame."""
         return frozenset()
 
-    def defines(self, frame: Frame) -> Mapping[str, int | float]:
+    def defines(self, frame: Frame) -> Mapping[str, Define]:
         """Choose the operator and the kind of exposure at compile time, unless the graph keeps all variants."""
         given = self.uniforms()
         chosen = {"OPERATOR": given["operator_number"], "AUTOMATIC": int(given["automatic"])}

@@ -1,9 +1,10 @@
-// Where a pixel's shadow ray to the spotlight starts, and how strongly it would light the pixel.
+// Where a pixel's shadow ray to a direct light starts, and how strongly it would light the pixel.
 #include "lib/surface/pixel.glsl"
 #include "lib/lights/direct.glsl"
 
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
+uniform int number;             // of the light in its block
 uniform float offset;           // off the surface, at least
 uniform float relative_offset;  // of the largest coordinate, as Tracer.lift says
 
@@ -18,5 +19,5 @@ void main() {
     Pixel p = read_pixel(normals, pixel, ndc, d);
     vec3 far = abs(p.position);
     float lift = max(offset, relative_offset * max(max(far.x, far.y), far.z));
-    start = vec4(p.position + p.normal * lift, light_strength(lights[0], p.position, p.normal, p.shading_normal));
+    start = vec4(p.position + p.normal * lift, light_strength(lights[number], p.position, p.normal, p.shading_normal));
 }

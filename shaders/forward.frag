@@ -19,7 +19,8 @@ layout(binding = UNIT_BLOCKERS) uniform sampler2D blockers;
 layout(binding = UNIT_MAPS) uniform sampler2DShadow vpl_maps[LIGHTS_PER_DRAW];
 #endif
 #if DIRECT
-uniform int number;  // of the light
+uniform int number;       // of the light in its block
+uniform int view_number;  // of the bound map's view, which adds its light where it looks
 #else
 uniform int numbers[LIGHTS_PER_DRAW];  // of this draw's VPLs, in this block
 uniform int count;
@@ -32,6 +33,9 @@ void main() {
     Surface s = surface();
     vec3 irradiance = vec3(0.0);
 #if DIRECT
+#if HAS_LIGHT_MAPS
+    if (choose_view(lights[number], s.position) != view_number) discard;
+#endif
     irradiance = light_irradiance(lights[number], s.position, s.normal, s.shading_normal);
 #if HAS_LIGHT_MAPS && HAS_BLOCKERS && SOFT && DISC
     irradiance *= light_visibility(light_maps, blockers, lights[number], s.position, s.normal);

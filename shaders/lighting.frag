@@ -21,8 +21,8 @@ uniform int block;  // number of the bound block of VPLs
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 layout(binding = UNIT_ALBEDO) uniform sampler2D albedo;
-#if HAS_SPOTLIGHT
-layout(binding = UNIT_SPOTLIGHT) uniform sampler2D spotlight;
+#if HAS_DIRECT
+layout(binding = UNIT_DIRECT) uniform sampler2D direct;
 #endif
 #if HAS_INDIRECT
 layout(binding = UNIT_INDIRECT) uniform sampler2D indirect;
@@ -37,8 +37,9 @@ layout(binding = UNIT_LONELY) uniform sampler2D lonely;
 #elif HAS_NEAR_FIELD
 layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
 #endif
-uniform int direct;  // direct lights to add up: all in the first draw of a pixel, else none
-uniform int count;   // VPLs of the block, where they are not in `indirect` already
+uniform bool first;       // draw of a pixel
+uniform int light_count;  // of the block
+uniform int count;        // VPLs of the block, where they are not in `indirect` already
 
 in vec2 ndc;
 layout(location = 0) out vec4 radiance;
@@ -74,10 +75,14 @@ void main() {
     }
     Pixel p = read_pixel(normals, pixel, ndc, d);
     vec3 irradiance = vec3(0.0);
-#if HAS_SPOTLIGHT
-    if (direct > 0) irradiance = lights[0].emission * texelFetch(spotlight, pixel, 0).r;
+#if HAS_DIRECT
+#if DIRECT_OVER_EMISSION
+    if (first) irradiance = lights[0].emission * texelFetch(direct, pixel, 0).r;
 #else
-    for (int i = 0; i < min(direct, LIGHTS_PER_BLOCK); ++i)  // of a known bound: a loop of one is none
+    if (first) irradiance = texelFetch(direct, pixel, 0).rgb;
+#endif
+#else
+    for (int i = 0; i < min(light_count, LIGHTS_PER_BLOCK); ++i)  // of a known bound: a loop of one is none
         irradiance += light_irradiance(lights[i], p.position, p.normal, p.shading_normal) * visibility(lights[i], p);
 #endif
 #if HAS_INDIRECT  // with the near field in it
@@ -91,7 +96,7 @@ void main() {
 #endif
 #else
 #if HAS_NEAR_FIELD
-    if (direct > 0) irradiance += texelFetch(near_field, pixel, 0).rgb;
+    if (first) irradiance += texelFetch(near_field, pixel, 0).rgb;
 #endif
 #if HAS_TILES  // only VPLs that may light the tile, in their order
     ivec2 tile = tile_of(pixel, textureSize(depth, 0));

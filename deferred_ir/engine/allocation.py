@@ -175,8 +175,9 @@ def _allocate(gpu: Gpu, description: Description, size: tuple[int, int]) -> Reso
         return GpuTexture(gpu, description, width_height)
     copies: list[GpuTexture] = []
     try:
-        for _ in range(description.copies):
-            copies.append(GpuTexture(gpu, description, width_height))
+        for number in range(description.copies):
+            own = (description.edges[number],) * 2 if description.edges else width_height
+            copies.append(GpuTexture(gpu, description, own))
     except DeviceError:
         _release(copies)  # the user is told to ask for less: room for that must be left
         raise

@@ -2,22 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from deferred_ir.graph.facts import Fact, Facts
 from deferred_ir.scene.scene import Scene
 
 EMITS = Fact("emits", unknown=True, doc="A light shines.", needs=True)
 TRIANGLES = Fact("triangles", unknown=0, doc="Triangles of the scene.")
 PIXELS = Fact("pixels", unknown=512 * 512, doc="Pixels of a frame.")
-SOFT = Fact("soft", unknown=False, doc="The spotlight is a disc.")
+SOFT = Fact("soft", unknown=False, doc="A direct light has an area: its shadows are soft.")
+DIRECT_LIGHTS = Fact("direct_lights", unknown=1, doc="Lights that shaders evaluate, on or off.")
+VIEWS = Fact[Sequence[int]](
+    "views", unknown=(0,), doc="Of each shadow map of direct lights, how often its edge is halved."
+)
+SAMPLED = Fact("sampled", unknown=True, doc="Lights shine for which points stand.", needs=True)
+ENVIRONMENT = Fact(
+    "environment", unknown=True, doc="There is light from all around, to see behind everything.", needs=True
+)
+EMISSION = Fact("emission", unknown=True, doc="Surfaces emit.", needs=True)
 SOFTWARE = Fact("software", unknown=True, doc="OpenGL draws on the CPU.")
 
 
 def collect_facts(scene: Scene, size: tuple[int, int] | None = None, *, software: bool | None = None) -> Facts:
     """Return what planning may know of `scene` and, where they are given, of the frame's size and the device."""
+    direct = scene.direct_lights
     facts = Facts(
         {
             EMITS: scene.emits,
-            SOFT: any(light.has_area for light in scene.direct_lights),
+            SOFT: any(light.has_area for light in direct),
+            DIRECT_LIGHTS: len(direct),
+            VIEWS: tuple(view.halvings for light in direct for view in light.list_views(scene.bounds)),
+            SAMPLED: bool(scene.sampled_lights),
+            ENVIRONMENT: scene.environment is not None,
+            EMISSION: scene.surface_light is not None,
             TRIANGLES: len(scene.geometry.faces),
         }
     )

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Vec3
+from deferred_ir.frame.direct_lights import DescribedViews, describe_views
 from deferred_ir.frame.light_culling import SeenClusters, find_seen_clusters
 from deferred_ir.frame.scene_buffers import SceneBuffers
 from deferred_ir.gl.textures import GpuTexture
@@ -73,6 +74,11 @@ class Frame:
     def near(self) -> float:
         """Near plane of the camera and of all lights, in world units."""
         return NEAR * self.scene.geometry.scale
+
+    @cached_property
+    def light_views(self) -> DescribedViews:
+        """The views of the scene's direct lights."""
+        return describe_views(self.scene)
 
     @cached_property
     def seen_clusters(self) -> SeenClusters:

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import NO_DEFINES, Io
+from deferred_ir.gl.shaders import Define
 from deferred_ir.graph.params import specs
 from deferred_ir.graph.pass_base import Pass
 
@@ -21,7 +22,7 @@ class FullscreenPass(Pass):
         """Return the values of uniforms: the parameters, unless overridden."""
         return {name: getattr(self.params, name) for name in specs(self.Params)}
 
-    def defines(self, frame: Frame) -> Mapping[str, int | float]:
+    def defines(self, frame: Frame) -> Mapping[str, Define]:
         """Return defines that choose a variant of the shader for this frame: none, unless overridden."""
         del frame
         return NO_DEFINES

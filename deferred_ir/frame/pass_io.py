@@ -9,14 +9,14 @@ from typing import Any, TypeVar
 from deferred_ir.base.errors import DeviceError, ShaderError
 from deferred_ir.gl.buffers import GpuBuffer
 from deferred_ir.gl.framebuffers import Framebuffer
-from deferred_ir.gl.shaders import Program, ShaderLibrary
+from deferred_ir.gl.shaders import Define, Program, ShaderLibrary
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.graph import Step
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Output
 from deferred_ir.graph.stages import SUFFIXES, find_stage
 
-NO_DEFINES: Mapping[str, int | float] = {}
+NO_DEFINES: Mapping[str, Define] = {}
 Resource = GpuTexture | GpuBuffer | list[GpuTexture]
 Meta = TypeVar("Meta")
 Rectangle = tuple[int, int, int, int]
@@ -52,7 +52,7 @@ class Io:
         textures = [name for name in step.work.inputs if isinstance(ports[name], GpuTexture)]
         sampled = [name for name in textures if not step.work.inputs[name].attach]
         self._units = {name: i for i, name in enumerate(sampled)}
-        self.defines: dict[str, int | float] = {f"UNIT_{name.upper()}": i for name, i in self._units.items()}
+        self.defines: dict[str, Define] = {f"UNIT_{name.upper()}": i for name, i in self._units.items()}
         self.metas: dict[str, Any] = {}
         for name, source in step.sources.items():
             self.defines[f"HAS_{name.upper()}"] = int(source is not None)
@@ -121,7 +121,7 @@ class Io:
         """Whether shaders of this run store into images."""
         return bool(self._images) and self.stage != "fragment"
 
-    def program(self, *files: str, defines: Mapping[str, int | float] = NO_DEFINES) -> Program:
+    def program(self, *files: str, defines: Mapping[str, Define] = NO_DEFINES) -> Program:
         """Return the program of these shader files, one a stage; they know the defines of the ports and `defines`."""
         key = (*files, *defines.items())
         if key not in self._programs:
@@ -133,7 +133,7 @@ class Io:
             self._programs[key] = program
         return self._programs[key]
 
-    def stage_program(self, file: str, defines: Mapping[str, int | float] = NO_DEFINES) -> Program:
+    def stage_program(self, file: str, defines: Mapping[str, Define] = NO_DEFINES) -> Program:
         """Return the program of a shader file, named without its suffix, in the stage that this run is in."""
         assert self.stage, f"{self.step.name} has no parameter 'stage'"
         return self.program(file + SUFFIXES[self.stage], defines=defines)

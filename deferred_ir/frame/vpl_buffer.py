@@ -82,6 +82,16 @@ def fill_view(records: np.ndarray, axis: Array, fov: float) -> None:
     records["tan_half"], records["curve"] = math.tan(half), cosine / (1 + cosine)
 
 
+def fill_parallel_view(records: np.ndarray, axis: Array, reach: float, depth: float) -> None:
+    """Fill the axes and scales of parallel views along unit `axis` (n, 3) into records (n,).
+
+    reach: half the width of the square that they cover. depth: how far they see, world units.
+    """
+    right, up = build_basis(axis)
+    records["x_axis"], records["y_axis"], records["z_axis"] = right / reach, up / reach, axis
+    records["tan_half"], records["curve"] = 0, 1 / depth
+
+
 def make_axes(axis: Array, fov: float) -> tuple[Array, Array, Array]:
     """Return right, up and forward (n, 3) of views along unit `axis` (n, 3), fov degrees wide: x_axis, y_axis, z_axis.
 

@@ -45,9 +45,11 @@ class Source:
     words: frozenset[str] = frozenset()
 
 
+Define = int | float | str
+"""What a word of a shader is replaced by: a number, or another word."""
 Files = tuple[tuple[str, ...], Path | None]
 """A program's files, one a stage, and the folder searched before the package's."""
-Key = tuple[tuple[str, ...], Path | None, tuple[tuple[str, int | float], ...]]
+Key = tuple[tuple[str, ...], Path | None, tuple[tuple[str, Define], ...]]
 """A program's files, the folder, and those of its defines that the files name."""
 
 
@@ -56,8 +58,10 @@ def package_shaders() -> Path:
     return Path(importlib.import_module("deferred_ir.shaders").__path__[0])
 
 
-def flatten(name: str, folders: Iterable[Path], defines: Mapping[str, int | float]) -> Source:
+def flatten(name: str, folders: Iterable[Path], defines: Mapping[str, Define]) -> Source:
     """Read the shader file `name`, looked for in `folders` in order, with its includes, each once.
+
+    An include that ends in a slash means all .glsl files of that folder.
 
     Of `defines` it gets those that its text names.
     """
@@ -77,14 +81,21 @@ def flatten(name: str, folders: Iterable[Path], defines: Mapping[str, int | floa
             if include is None:
                 body.append(line)
                 lines.append((file, number))
-            elif include[1] not in seen:
-                add(include[1], f"{file}:{number}")
+            else:
+                for other in _list_folder(include[1], search) if include[1].endswith("/") else [include[1]]:
+                    if other not in seen:
+                        add(other, f"{file}:{number}")
 
     add(name, name)
     words = frozenset(word for line in body for word in _WORD.findall(line))
     head = [VERSION, *(f"#define {key} {defines[key]}" for key in sorted(words & defines.keys()))]
     places = [("defines", i + 1) for i in range(len(head))]
     return Source("\n".join([*head, *body]) + "\n", (*places, *lines), words)
+
+
+def _list_folder(folder: str, search: Iterable[Path]) -> list[str]:
+    """Return the files of a folder, "lib/.../", in alphabetical order."""
+    return sorted({f"{folder}{path.name}" for root in search for path in (root / folder).glob("*.glsl")})
 
 
 class Program:
@@ -147,12 +158,10 @@ class ShaderLibrary:
         self.gpu = gpu
         self.compiled = 0
         self._programs: dict[Key, Program] = {}
-        self._defines: dict[Key, dict[str, int | float]] = {}  # with those that the files may name once they change
+        self._defines: dict[Key, dict[str, Define]] = {}  # with those that the files may name once they change
         self._words: dict[Files, frozenset[str]] = {}
 
-    def program(
-        self, *files: str, defines: Mapping[str, int | float] | None = None, folder: Path | None = None
-    ) -> Program:
+    def program(self, *files: str, defines: Mapping[str, Define] | None = None, folder: Path | None = None) -> Program:
         """Return the program of these files, one a stage: a .comp alone; without a .vert it covers the whole target.
 
         `defines` make a difference where a file names them. `folder` is searched before the package's shaders.
@@ -185,7 +194,7 @@ class ShaderLibrary:
         After a ShaderError the programs are those from before.
         """
         programs: dict[Key, Program] = {}
-        defines: dict[Key, dict[str, int | float]] = {}
+        defines: dict[Key, dict[str, Define]] = {}
         words: dict[Files, frozenset[str]] = {}
         before = set(self._programs.values())
         try:
@@ -236,7 +245,7 @@ def _words(sources: Mapping[str, Source]) -> frozenset[str]:
     return frozenset().union(*(source.words for source in sources.values()))
 
 
-def _key(files: tuple[str, ...], folder: Path | None, defines: Mapping[str, int | float], words: frozenset[str]) -> Key:
+def _key(files: tuple[str, ...], folder: Path | None, defines: Mapping[str, Define], words: frozenset[str]) -> Key:
     return files, folder, tuple((name, defines[name]) for name in sorted(words & defines.keys()))
 
 

@@ -34,16 +34,21 @@ def compile(
     faults: list[str] = []
     roots, edges = _resolve(graph, outputs, faults)
     known = _gather_facts({node.name: node.work for node in graph.nodes.values()}, facts, faults)
-    unneeded = _leave_out(graph, edges, known.forget_needs() if keep_all else known, faults)
-    for name, (source, _) in roots.items():
+    needs = known.forget_needs() if keep_all else known
+    unneeded, ports = _leave_out(graph, edges, needs, faults)
+    for name, (source, port) in roots.items():
         if source in unneeded:
             faults.append(f"output '{name}' comes from {source}, which is left out: {unneeded[source]}")
+        elif (why := ports.get((source, port))) is not None:
+            faults.append(f"output '{name}' is {source}.{port}, which is left out: {why}")
     reached = _reach(roots, edges, unneeded)
-    steps = _describe(graph, edges, _order(edges, reached, faults), parts, faults)
+    steps = _describe(graph, edges, _order(edges, reached, faults), (known, parts), faults)
     if faults:
         text = " ".join("; ".join(faults).split())  # a name may hold a line break
         raise GraphError(f"{graph.origin}: {text}")
     left_out = {name: unneeded.get(name, "no requested output needs it") for name in graph.nodes if name not in reached}
+    steps = tuple(_drop(step, {port for name, port in ports if name == step.name}) for step in steps)
+    left_out |= {f"{name}.{port}": why for (name, port), why in ports.items() if name in reached}
     if not keep_all:
         steps, unread = _drop_spare(steps, roots)
         left_out |= unread
@@ -100,12 +105,15 @@ def _gather_facts(passes: Mapping[str, Pass], facts: Facts, faults: list[str]) -
     return facts.add(stated)
 
 
-def _leave_out(graph: Graph, edges: Edges, facts: Facts, faults: list[str]) -> dict[str, str]:
+def _leave_out(
+    graph: Graph, edges: Edges, facts: Facts, faults: list[str]
+) -> tuple[dict[str, str], dict[tuple[str, str], str]]:
     """Find the passes that are not needed where `facts` hold, that others replace, and that cannot run without these.
 
-    Returns the reason for each.
+    Returns the reason for each, and that for each (pass, port) that is not needed.
     """
     unneeded: dict[str, str] = {}
+    ports = {(n.name, port): why for n in graph.nodes.values() for port, why in n.work.unneeded_outputs(facts).items()}
     for node in graph.nodes.values():
         try:
             if why := node.work.unneeded(facts):
@@ -113,6 +121,10 @@ def _leave_out(graph: Graph, edges: Edges, facts: Facts, faults: list[str]) -> d
         except GraphError as error:
             faults.append(f"{node.name}: {error}")
     wires = [(name, port, source) for name, ports in edges.items() for port, source in ports.items() if source]
+
+    for name, port, origin in wires:
+        if origin in ports and not graph.nodes[name].work.inputs[port].optional:
+            unneeded.setdefault(name, f"its input {port} is not needed: {ports[origin]}")
 
     def spread() -> None:
         known = -1
@@ -127,10 +139,10 @@ def _leave_out(graph: Graph, edges: Edges, facts: Facts, faults: list[str]) -> d
         if source not in unneeded and graph.nodes[name].work.inputs[port].replaces:
             unneeded.setdefault(name, f"not needed: {source} replaces it")
     spread()
-    for name, port, (source, _) in wires:
-        if source in unneeded:
+    for name, port, origin in wires:
+        if origin[0] in unneeded or origin in ports:
             edges[name][port] = None
-    return unneeded
+    return unneeded, ports
 
 
 def _reach(roots: Roots, edges: Edges, unneeded: Mapping[str, str]) -> set[str]:
@@ -158,9 +170,13 @@ def _order(edges: Edges, reached: set[str], faults: list[str]) -> list[str]:
 
 
 def _describe(
-    graph: Graph, edges: Edges, order: list[str], parts: Collection[str] | None, faults: list[str]
+    graph: Graph, edges: Edges, order: list[str], known: tuple[Facts, Collection[str] | None], faults: list[str]
 ) -> tuple[Step, ...]:
-    """Ask each pass what it writes, given what it reads, and check that both ends of each wire agree."""
+    """Ask each pass what it writes, given what it reads, and check that both ends of each wire agree.
+
+    known: facts, and the names that `Pass.depends` may give.
+    """
+    facts, parts = known
     steps: dict[str, Step] = {}
     for name in order:
         work, descriptions = graph.nodes[name].work, dict[str, Description | None]()
@@ -181,7 +197,7 @@ def _describe(
         if descriptions.keys() >= wires.keys() | required:
             described = dict.fromkeys(work.inputs) | descriptions
             try:
-                step = Step(name, work, edges[name], work.outputs(described), described)
+                step = Step(name, work, edges[name], work.outputs_for(facts, described), described)
             except GraphError as error:
                 faults.append(f"{name}: {error}")
                 continue
@@ -207,14 +223,16 @@ def _describe(
     return tuple(steps.values())
 
 
+def _drop(step: Step, ports: Collection[str]) -> Step:
+    """Return a step without some of its outputs."""
+    return replace(step, outputs={port: output for port, output in step.outputs.items() if port not in ports})
+
+
 def _drop_spare(steps: tuple[Step, ...], roots: Roots) -> tuple[tuple[Step, ...], dict[str, str]]:
     """Drop the outputs that nobody reads and their passes can do without. Returns the steps, and each reason."""
     read = {source for step in steps for source in step.sources.values() if source} | set(roots.values())
     spare = {(s.name, port) for s in steps for port, output in s.outputs.items() if output.spare} - read
-    slim = tuple(
-        replace(s, outputs={port: output for port, output in s.outputs.items() if (s.name, port) not in spare})
-        for s in steps
-    )
+    slim = tuple(_drop(step, {port for name, port in spare if name == step.name}) for step in steps)
     return slim, {f"{name}.{port}": "nothing reads it" for name, port in sorted(spare)}
 
 

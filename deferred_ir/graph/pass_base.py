@@ -45,6 +45,16 @@ class Pass:
         """
         raise NotImplementedError
 
+    def outputs_for(self, facts: Facts, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+        """Return `outputs` where their sizes follow from facts of the scene."""
+        del facts
+        return self.outputs(inputs)
+
+    def unneeded_outputs(self, facts: Facts) -> Mapping[str, str]:
+        """Return the ports that are not needed where `facts` hold, and why; their readers go without, as of a pass."""
+        del facts
+        return {}
+
     def state_facts(self, facts: Facts) -> Statements:
         """Return the facts that the pass's parameters imply for other passes, {Fact: value}.
 

@@ -14,7 +14,8 @@ from typing import Any
 class Texture:
     """A texture: `size` (width, height), None for the frame's; `layers` > 0 makes it an array.
 
-    `copies` > 0 makes that many separate textures, which the pass itself attaches and binds one by one. `grows`: it
+    `copies` > 0 makes that many separate textures, which the pass itself attaches and binds one by one; `edges`: widths
+    and heights of these, where they differ. `grows`: it
     begins with one layer, and its pass asks for as many as a frame needs, `layers` at most. `mend` says what to use
     where a driver takes none as large.
     """
@@ -23,6 +24,7 @@ class Texture:
     size: tuple[int, int] | None = None
     layers: int = 0
     copies: int = 0
+    edges: tuple[int, ...] = ()
     grows: bool = False
     mend: str = field(default="a smaller size", compare=False)
 

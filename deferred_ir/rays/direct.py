@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,14 +41,14 @@ class AllLight:
         return total
 
 
-def trace_spotlight(job: PixelJob, *, samples: int) -> Array:
-    """Return the spotlight's irradiance over its emission, float32 (H, W), bottom row first as in OpenGL.
+def trace_light(job: PixelJob, light: Light, *, samples: int) -> Array:
+    """Return a light's irradiance over its emission, float32 (H * W,), bottom row first as in OpenGL.
 
-    It is 0 on the background, and exact for a point light. A disc is sampled at `samples` points a pixel, spread over
-    it together by the pixels of a block; the mean over seeds is exact.
+    It is 0 on the background, and exact for a light without area. Others are sampled at `samples` points a pixel,
+    spread over them together by the pixels of a block; the mean over seeds is exact.
     """
     tracer, seen, seed, block = job.tracer, job.seen, job.seed, job.block
-    light, (width, height) = tracer.scene.spotlight, job.size
+    width, height = job.size
     image = np.zeros(height * width, np.float32)
     tasks = [(i, slice(start, start + PIXELS)) for i, start in enumerate(range(0, len(seen.pixel), PIXELS))]
     dealing = streams.shadow_blocks(seed)
@@ -68,7 +69,36 @@ def trace_spotlight(job: PixelJob, *, samples: int) -> Array:
     with closing(run_in_order(work, tasks, job.threads)) as results:
         for (_, rows), part in zip(tasks, results, strict=True):
             image[seen.pixel[rows]] = part
-    return image.reshape(height, width)
+    return image
+
+
+def trace_direct(job: PixelJob, *, samples: int) -> Array:
+    """Return the irradiance of all direct lights, float32 (H, W, 4); of an only one over its emission, (H, W, 1).
+
+    samples: see `trace_light`.
+    """
+    lights, (width, height) = job.tracer.scene.direct_lights, job.size
+    total = DirectSum(len(lights), width * height)
+    for number, light in enumerate(lights):
+        if any(light.emission):
+            own = replace(job, seed=streams.frame_seed(job.seed, number))
+            total.add(light, trace_light(own, light, samples=samples))
+    return total.image.reshape(height, width, -1)
+
+
+class DirectSum:
+    """Adds up the irradiance of `lights` direct lights at `pixels`; that of an only one over its emission."""
+
+    def __init__(self, lights: int, pixels: int) -> None:
+        self._only = lights <= 1
+        self.image: Array = np.zeros((pixels, 1 if self._only else 4), np.float32)
+
+    def add(self, light: Light, strength: Array) -> None:
+        """Add a light's irradiance over its emission, float32 (pixels,)."""
+        if self._only:
+            self.image[:, 0] = strength
+        else:
+            self.image[:, :3] += np.multiply.outer(strength, np.asarray(light.emission, np.float32))
 
 
 def _spiral(places: Array, i: int, count: int) -> Array:

@@ -19,6 +19,7 @@ from deferred_ir.base.errors import SceneError, SettingError
 from deferred_ir.scene.camera import Camera, find_view_fault
 from deferred_ir.scene.geometry import Geometry, Model
 from deferred_ir.scene.lights.base import Bounds, DirectLight, Light, SampledLight, is_direct, is_sampled
+from deferred_ir.scene.lights.environment import Environment
 from deferred_ir.scene.lights.fields import LightError
 from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.materials import Material, Texture
@@ -93,6 +94,11 @@ class Scene:
     def sampled_lights(self) -> tuple[SampledLight, ...]:
         """The lights that points stand for, if they are on."""
         return tuple(light for light in self.emitters if is_sampled(light))
+
+    @property
+    def environment(self) -> Environment | None:
+        """Its first environment, if that is on: what the camera sees behind everything."""
+        return next((x for x in self.lights if isinstance(x, Environment) and any(x.emission)), None)
 
     @property
     def spotlight(self) -> Spotlight:

@@ -7,43 +7,22 @@ it is worth: clusters none of whose edges can bend by more than `bend` texels ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.frame.cluster_buffers import ClusterBuffers
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.shadows.batches import MapBatch
 from deferred_ir.shadows.settings import LEAST_REACH, MapParams
 
 FILES = ("shadow_maps/paraboloid.frag", "shadow_maps/paraboloid.vert")
 SPLIT = ("shadow_maps/paraboloid.tesc", "shadow_maps/paraboloid.tese")
 
 
-@dataclass(frozen=True, eq=False)
-class MapBatch:
-    """Maps that are drawn together: the rows `chosen` (m,) of the bound block of VPLs or of views, `records` (n,).
-
-    vpls: they are VPLs. curved: their maps are paraboloids. size: of the maps, texels, one or (n,).
-    """
-
-    records: np.ndarray
-    chosen: Ints
-    size: Array | float
-    vpls: bool
-    curved: bool
-
-    @property
-    def defines(self) -> dict[str, int | float]:
-        """Tells shaders which block they draw from."""
-        return {"DRAWS_VPLS": int(self.vpls)}
-
-
 def draw_curved(mesh: ClusterBuffers, io: Io, params: MapParams, batch: MapBatch, *, layered: bool) -> None:
     """Draw `mesh` into paraboloid maps; layered: into an atlas."""
     gpu, clusters, views = io.gpu, mesh.clusters, batch.records[batch.chosen]
     straight = batch.vpls and params.tessellation == "pre"
-    visible = clusters.find_visible(views, hemisphere=True)
+    visible = batch.find_visible(clusters)
     bent = np.False_ if straight else clusters.find_bent(views, params.reach(views, batch.size))
     gpu.clip(5)  # behind the view, and the map's four sides
     geometry = ["shadow_maps/paraboloid.geom"] if layered and not gpu.layer_from_vertex else []

@@ -75,12 +75,12 @@ class MapParams:
                 "use fewer, a smaller shadow_maps.vpl_size or a larger budget"
             )
 
-    def check_layers(self, vpls: int, layers: int, tiles: int) -> None:
-        """Raise GraphError if an atlas needs too many layers. tiles: of VPLs on a layer; the first layer has none."""
+    def check_layers(self, vpls: int, layers: int, tiles: int, first: int) -> None:
+        """Raise GraphError if an atlas needs too many layers. tiles: of VPLs on a layer; the `first` ones have none."""
         if layers > MOST_LAYERS:
             raise GraphError(
                 f"maps for {vpls} VPLs of {self.vpl_size}x{self.vpl_size} need {layers} layers, and there are "
-                f"{MOST_LAYERS}; {(MOST_LAYERS - 1) * tiles} VPLs fit, all bounces together; "
+                f"{MOST_LAYERS}; {max(MOST_LAYERS - first, 0) * tiles} VPLs fit, all bounces together; "
                 "use fewer, a smaller shadow_maps.vpl_size or a larger shadow_maps.spot_size"
             )
 

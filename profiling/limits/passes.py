@@ -13,7 +13,8 @@ from deferred_ir.gl.shaders import Program
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.passes.shadow_maps import ShadowMaps
-from deferred_ir.shadows.views import pack_views
+from deferred_ir.shadows.layout import lay_out
+from deferred_ir.shadows.views import PLANAR, pack_views
 
 FOLDER = Path(__file__).parent
 
@@ -74,13 +75,15 @@ class LimitMaps(ShadowMaps):
         vpls, edge = io["vpls"], io.framebuffer.size[0]
         io.framebuffer.clear_depth()
         self.params.prepare(io.gpu)
-        views = pack_views(frame, self.params, edge)
+        described = frame.light_views
+        layout = lay_out([view.halvings for view in described.views], self.params, edge)
+        views = pack_views(frame, described, layout, edge)
         io["views"].write(views)
         io["views"].bind()
         spot, *tiles = self.subpasses({**dict.fromkeys(self.inputs), "vpls": vpls.description})
         files = "shadow_maps/depth.frag", "shadow_maps/single.vert"
-        self._draw_map(frame, io, io.program(*files, defines={"DRAWS_VPLS": 0}), spot, 0)
-        program = io.program(*files, defines={"DRAWS_VPLS": 1})
+        self._draw_map(frame, io, io.program(*files, defines={"DRAWS_VPLS": 0, "DRAWN_PROJECTION": PLANAR}), spot, 0)
+        program = io.program(*files, defines={"DRAWS_VPLS": 1, "DRAWN_PROJECTION": PLANAR})
         for i, place in enumerate(tiles[: len(vpls.records)]):
             if i % VPLS_PER_BLOCK == 0:
                 vpls.bind(i // VPLS_PER_BLOCK)

@@ -19,7 +19,7 @@ flat out int layer;
 
 void main() {
     View view = drawn_view(view_index);
-    vec4 clip = planar_clip(view, position);
+    vec4 clip = flat_clip(view, position);
     // The four sides of the map: the hardware clips at those of the whole layer only.
     gl_ClipDistance[0] = clip.w + clip.x;
     gl_ClipDistance[1] = clip.w - clip.x;

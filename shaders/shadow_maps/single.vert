@@ -6,5 +6,5 @@ uniform int view_number;  // in this block
 in vec3 position;
 
 void main() {
-    gl_Position = planar_clip(drawn_view(view_number), position);
+    gl_Position = flat_clip(drawn_view(view_number), position);
 }

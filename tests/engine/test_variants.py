@@ -93,4 +93,4 @@ def test_without_a_clamp_or_shading_normals_shaders_do_not_name_them(renderer):
     one = renderer(SIZE, "deferred", set={**FEW, "vpl.clamp": 0.0})
     one.render(room())
     defines = [dict(key[2]) for key in one.executor.library._programs if key[0] == ("lighting.frag",)]
-    assert [(d["CLAMPED"], d["SMOOTH"], d["DISC"], d["VIEWS_PARABOLOID"]) for d in defines] == [(0, 0, 0, 0)]
+    assert [(d["CLAMPED"], d["SMOOTH"], d["DISC"], d["VIEWS_PROJECTION"]) for d in defines] == [(0, 0, 0, 0)]

@@ -10,13 +10,17 @@ import numpy as np
 import pytest
 from small_scenes import box, build, room
 
-from deferred_ir.frame.direct_lights import LIGHT, LightVersions, find_view_owners, pack_lights
+from deferred_ir.frame.direct_lights import LIGHT, LightVersions, describe_views, list_kinds, pack_lights
 from deferred_ir.frame.vpl_buffer import VPL, MapVersions, VplParams, fill_view, pack_vpls
 from deferred_ir.sampling.warps import build_basis
 from deferred_ir.scene.lights.base import LightView
 from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.shadows.views import VIEW
 from deferred_ir.vpls.cast import NONE, Vpls
+
+
+def pack(scene):
+    return pack_lights(scene, describe_views(scene), list_kinds(scene))
 
 
 def unit(*vector: float) -> np.ndarray:
@@ -44,7 +48,7 @@ def test_records_are_vec4_of_std140():
 def test_the_record_of_the_spotlight_holds_what_shaders_read():
     scene = room()
     light = replace(scene.spotlight, radius=0.25)
-    records = pack_lights(replace(scene, lights=(light,)))
+    records = pack(replace(scene, lights=(light,)))
     assert records.shape == (1,)
     np.testing.assert_array_equal(records["position"][0], np.float32(light.position))
     np.testing.assert_allclose(records["axis"][0], light.axis, atol=1e-7)
@@ -66,8 +70,8 @@ class Lamp(Spotlight):
 def test_lights_have_any_number_of_views():
     lights = [Lamp((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), views=views) for views in (2, 0, 1)]
     scene = SimpleNamespace(direct_lights=lights, bounds=None)
-    np.testing.assert_array_equal(find_view_owners(scene), [0, 0, 2])
-    assert [pack_lights(scene)["view"][i] for i in (0, 2)] == [0, 2]
+    np.testing.assert_array_equal(describe_views(scene).owners, [0, 0, 2])
+    assert [pack(scene)["view"][i] for i in (0, 2)] == [0, 2]
 
 
 def test_records_of_vpls_hold_what_shaders_read():
@@ -102,14 +106,14 @@ def test_the_axes_of_a_view_take_the_cone_to_the_unit_square(fov):
 
 def test_a_map_stays_while_its_light_looks_the_same():
     scene, versions = room(), LightVersions()
-    first = versions.update(pack_lights(scene), scene)
+    first = versions.update(pack(scene), scene)
     for change in ({"emission": (9.0, 9.0, 9.0)}, {"radius": 0.1}, {}):
         same = replace(scene, lights=(replace(scene.spotlight, **change),))
-        assert versions.update(pack_lights(same), same) == first
+        assert versions.update(pack(same), same) == first
     for change in ({"fov": 40.0}, {"position": (0.1, 0.9, 0.1)}, {"look_at": (0.2, -1.0, 0.0)}):
         other = replace(scene, lights=(replace(scene.spotlight, **change),))
-        assert versions.update(pack_lights(other), other) != first
-        first = versions.update(pack_lights(scene), scene)
+        assert versions.update(pack(other), other) != first
+        first = versions.update(pack(scene), scene)
 
 
 def test_maps_of_vpls_stay_while_they_look_the_same():

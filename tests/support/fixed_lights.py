@@ -9,12 +9,16 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.engine.renderer import Renderer
-from deferred_ir.frame.direct_lights import pack_lights
+from deferred_ir.frame.direct_lights import describe_views, list_kinds, pack_lights
 from deferred_ir.frame.vpl_buffer import BINDING, DEFINES, VPL, VPLS_PER_BLOCK, VplParams, VplsMeta, fill_view
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Output
 from deferred_ir.passes.lights import Lights
 from deferred_ir.scene.lights.spotlight import one_minus_cos
+
+
+def pack(scene):
+    return pack_lights(scene, describe_views(scene), list_kinds(scene))
 
 
 def fixed_vpls(records: np.ndarray) -> type[Pass]:
@@ -35,7 +39,7 @@ class DarkLights(Lights):
     """The lights of the scene without their power; planning takes the scene for lit."""
 
     def execute(self, frame: Any, io: Any) -> None:
-        records = pack_lights(frame.scene)
+        records = pack(frame.scene)
         records["emission"] = 0
         io["lights"].write(records)
 

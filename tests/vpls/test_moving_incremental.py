@@ -12,7 +12,7 @@ from moving_scenes import AROUND, UP, VECTORS, WALLS, bake, pose_matrix, room_wi
 from shadow_atlas import read_atlas, read_vpl_maps
 from small_scenes import box, build
 
-from deferred_ir.frame.direct_lights import LightVersions, pack_lights
+from deferred_ir.frame.direct_lights import LightVersions, describe_views, list_kinds, pack_lights
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.lights.spotlight import Spotlight, one_minus_cos
 from deferred_ir.scene.motion import ModelMotion
@@ -26,6 +26,10 @@ LIGHT = Spotlight((-0.4, 0.9, 0.3), (0.1, -1.0, -0.1), 110.0, (3.0, 2.5, 2.0))
 STILL = (0.0, 0.0, 0.0, 1.0)
 SCENE = room_with_moving_models()
 TRACER = Tracer(SCENE.at(0.0))
+
+
+def pack(scene):
+    return pack_lights(scene, describe_views(scene), list_kinds(scene))
 
 
 def corners(box_of: np.ndarray) -> np.ndarray:
@@ -148,10 +152,10 @@ def test_lights_that_a_model_moves_behind_do_not_notice():
     tracer, state = Tracer(scene.at(0.0)), IncrementalVpls(16)
     state.update(light, tracer, least=0, most=16)
     spotlight, before = LightVersions(), state.version.copy()
-    spot = spotlight.update(pack_lights(scene), scene.at(0.0))
+    spot = spotlight.update(pack(scene), scene.at(0.0))
     tracer.follow(scene.at(0.5))
     state.update(light, tracer, least=0, most=16)
-    assert spotlight.update(pack_lights(scene), scene.at(0.5)) == spot
+    assert spotlight.update(pack(scene), scene.at(0.5)) == spot
     assert (state.version != before).all()
     # Below the floor, behind the VPLs and before the light: the other way round.
     deep = replace(shade, translations=((0.0, -3.0, 0.0), (0.2, -3.0, 0.0)))
@@ -159,10 +163,10 @@ def test_lights_that_a_model_moves_behind_do_not_notice():
     tracer, state = Tracer(scene.at(0.0)), IncrementalVpls(16)
     state.update(light, tracer, least=0, most=16)
     spotlight, before = LightVersions(), state.version.copy()
-    spot = spotlight.update(pack_lights(scene), scene.at(0.0))
+    spot = spotlight.update(pack(scene), scene.at(0.0))
     tracer.follow(scene.at(0.5))
     state.update(light, tracer, least=0, most=16)
-    assert spotlight.update(pack_lights(scene), scene.at(0.5)) != spot
+    assert spotlight.update(pack(scene), scene.at(0.5)) != spot
     assert (state.version == before).all()
 
 

@@ -133,14 +133,14 @@ class SampledLight(Light, Protocol):
         """Return points that stand for it together. square: of the unit square, (n, 2), evenly spread."""
 
 
-def is_direct(light: Light) -> TypeGuard[DirectLight]:
-    """Return whether shaders evaluate a light."""
-    return hasattr(type(light), "describe")
+def is_direct(light: Any) -> TypeGuard[DirectLight]:
+    """Return whether shaders evaluate a light, or a class of lights."""
+    return hasattr(light, "describe")
 
 
-def is_sampled(light: Light) -> TypeGuard[SampledLight]:
+def is_sampled(light: Any) -> TypeGuard[SampledLight]:
     """Return whether points stand for a light."""
-    return hasattr(type(light), "spread")
+    return hasattr(light, "spread")
 
 
 def aim(source: Array, at: Array) -> tuple[Array, Array]:

@@ -1,24 +1,41 @@
-// Direct lights (deferred_ir/frame/direct_lights.py): their records, and the irradiance from one without its shadow.
+// Direct lights (deferred_ir/frame/direct_lights.py): their records, a block at a time, and the irradiance from one without
+// its shadow.
 #include "lib/lights/light.glsl"
 
 struct DirectLight {
     vec3 position;
     float one_minus_cos;  // 1 - cos of the half cone angle
     vec3 axis;            // unit; where the light shines
-    float radius;         // of its disc
+    float radius;         // of its disc or ball; of one at infinity the tangent of half its angle
     vec3 emission;
     float view;           // number of its first view in `views`
+    float kind;           // of LIGHT_KINDS
+    float view_count;
+    float soft_edge;      // 1 - cos over which a spot's edge falls
+    float unused;
 };
 
 layout(std140, binding = LIGHTS_BINDING) uniform Lights { DirectLight lights[LIGHTS_PER_BLOCK]; };
 
-#include "lib/lights/kinds/spotlight.glsl"
+#ifdef LIGHT_KINDS  // not where only views matter
+// For each kind, a file: NAME_strength, the irradiance over emission.
+#include "lib/lights/kinds/"
 
-// The only place that tells kinds of lights apart: irradiance over emission.
+// STRENGTH_0 and so on are those functions of the kinds that the scene has.
 float light_strength(DirectLight light, vec3 position, vec3 normal, vec3 shading_normal) {
-    return spotlight_strength(light, position, normal, shading_normal);
+#if LIGHT_KINDS > 1
+    if (light.kind == 1.0) return STRENGTH_1(light, position, normal, shading_normal);
+#endif
+#if LIGHT_KINDS > 2
+    if (light.kind == 2.0) return STRENGTH_2(light, position, normal, shading_normal);
+#endif
+#if LIGHT_KINDS > 3
+    if (light.kind == 3.0) return STRENGTH_3(light, position, normal, shading_normal);
+#endif
+    return STRENGTH_0(light, position, normal, shading_normal);
 }
 
 vec3 light_irradiance(DirectLight light, vec3 position, vec3 normal, vec3 shading_normal) {
     return light.emission * light_strength(light, position, normal, shading_normal);
 }
+#endif

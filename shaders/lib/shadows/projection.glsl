@@ -3,7 +3,7 @@
 // A planar map covers the view's cone by a perspective projection, with reversed depth along its axis
 // (lib/camera/depth.glsl). A paraboloid map (Brabec et al. 2002), which can be as wide as the hemisphere, is the
 // stereographic projection of the directions: the cone's edge is the circle of radius 1, and the depth is
-// near / distance.
+// near / distance. A parallel map covers a box, with depth from 1 where light enters to 0 where the box ends.
 #include "lib/camera/frame.glsl"
 #include "lib/lights/light.glsl"
 #include "lib/shadows/view.glsl"
@@ -22,9 +22,15 @@ float texel_angle(View view) {
     return 4.0 * view.curve * view.tan_half / view.size;
 }
 
-// Clip position in the view's planar map.
-vec4 planar_clip(View view, vec3 position) {
+float parallel_depth(View view, vec3 d) {
+    return 1.0 - dot(d, view.z_axis) * view.curve;
+}
+
+// Clip position in the view's planar or parallel map.
+vec4 flat_clip(View view, vec3 position) {
     vec3 d = position - view.position;
+    if (view.projection == PARALLEL_VIEW)
+        return clip_position(vec2(dot(d, view.x_axis), dot(d, view.y_axis)), parallel_depth(view, d), 1.0);
     return clip_position(vec2(dot(d, view.x_axis), dot(d, view.y_axis)), frame.near, planar_divisor(view, d));
 }
 
@@ -89,6 +95,20 @@ Receiver paraboloid_receiver(View view, vec3 position, vec3 normal, float offset
     return r;
 }
 
+Receiver parallel_receiver(View view, vec3 position, vec3 normal, float offset) {
+    float width = inversesqrt(dot(view.x_axis, view.x_axis)), texel = 2.0 / view.size * width;  // world units
+    vec3 d = position - view.position + normal * (offset * texel);
+    Receiver r;
+    r.texel = (vec2(dot(d, view.x_axis), dot(d, view.y_axis)) * 0.5 + 0.5) * view.size;
+    r.depth = parallel_depth(view, d);
+    // On the plane of the face the depth along the axis changes by -(normal . x) / (normal . axis) of a step across.
+    vec2 n = vec2(dot(normal, view.x_axis), dot(normal, view.y_axis)) * width;
+    r.slope = n * (texel * view.curve / min(dot(normal, view.z_axis), -1e-6));
+    r.bend = vec4(0.0);
+    r.reach = 0.0;
+    return r;
+}
+
 // The depth to compare with: the nearest that the point's plane reaches in the four texels about `texel`, where it has
 // `depth` and `slope`; never farther than the point itself.
 vec3 nearest_of_four(Receiver r, vec2 texel, float depth, vec2 slope) {
@@ -123,6 +143,7 @@ vec3 comparison(Receiver r, float size) {
 
 // The point `position` of a face with the geometric normal `normal`, lifted off it by `offset` texels.
 Receiver receiver(View view, vec3 position, vec3 normal, float offset) {
-    if (view.paraboloid > 0.5) return paraboloid_receiver(view, position, normal, offset);
+    if (view.projection == PARALLEL_VIEW) return parallel_receiver(view, position, normal, offset);
+    if (view.projection == PARABOLOID_VIEW) return paraboloid_receiver(view, position, normal, offset);
     return planar_receiver(view, position, normal, offset);
 }

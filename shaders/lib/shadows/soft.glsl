@@ -8,14 +8,14 @@
 
 vec3 map_vector(View view, vec2 texel) {
     vec2 ndc = texel * (2.0 / view.size) - 1.0;
-    if (view.paraboloid <= 0.5) return vec3(ndc * view.tan_half, 1.0);
+    if (view.projection != PARABOLOID_VIEW) return vec3(ndc * view.tan_half, 1.0);
     vec2 p = ndc * (view.curve * view.tan_half);
     return vec3(2.0 * p, 1.0 - dot(p, p)) / (1.0 + dot(p, p));
 }
 
 // v points forwards: at the receiver, from where it is moved within the plane across the view's axis.
 vec2 map_texel(View view, vec3 v) {
-    float divisor = view.paraboloid > 0.5 ? view.curve * (length(v) + v.z) : v.z;
+    float divisor = view.projection == PARABOLOID_VIEW ? view.curve * (length(v) + v.z) : v.z;
     return (v.xy / (divisor * view.tan_half) * 0.5 + 0.5) * view.size;
 }
 
@@ -32,11 +32,52 @@ float blocker(DEPTHS map, View view, Receiver r, vec3 v, vec2 offset, float radi
     return between && depth > receiver_plane(r, texel - r.texel).z ? v.z * depth / (b.z * r.depth) : 0.0;
 }
 
+// If the surface in a parallel map `offset` texels away hides a part of the disc: the depth between. Else 0.
+float parallel_blocker(DEPTHS map, View view, Receiver r, vec2 offset, float texels) {
+    vec2 texel = floor(clamp(r.texel + offset, 0.5, view.size - 0.5)) + 0.5;
+    float between = depth_at(map, view.rectangle, ivec2(texel)) - r.depth;
+    bool hides = length(texel - r.texel) <= texels * between;
+    return hides && between + r.depth > receiver_plane(r, texel - r.texel).z ? between : 0.0;
+}
+
+// As `soft_visibility` below, for light from infinity, from a disc of the sky; slope: tangent of half its angle.
+float parallel_visibility(MAP map, DEPTHS depths, View view, float slope, Receiver r, float noise, vec2 start) {
+    float texels = slope * 0.5 * view.size * length(view.x_axis) / view.curve;  // of a penumbra, over the depth between
+    float most = 0.0;
+    vec2 direction = start;
+    for (int i = 0; i < SEARCH_TAPS; ++i) {
+        vec2 offset = direction * (texels * (1.0 - r.depth) * exp2(-9.0 * (float(i) + noise) / float(SEARCH_TAPS)));
+        most = max(most, parallel_blocker(depths, view, r, offset, 4.0 * texels));
+        direction = turned(direction);
+    }
+    most = max(most, parallel_blocker(depths, view, r, vec2(0.0), texels));
+    if (most <= 0.0) return -1.0;
+    float sum = 0.0, found = 0.0;
+    direction = start;
+    for (int i = 0; i < SEARCH_TAPS; ++i) {
+        vec2 offset = direction * (texels * most * sqrt(float(i) / float(SEARCH_TAPS)));
+        float one = parallel_blocker(depths, view, r, offset, texels);
+        sum += one;
+        found += float(one > 0.0);
+        direction = turned(direction);
+    }
+    if (found == 0.0) return -1.0;
+    float lit = 0.0;
+    direction = start;
+    for (int i = 0; i < SOFT_TAPS; ++i) {
+        vec2 offset = direction * (texels * sum / found * spread(i, SOFT_TAPS));
+        lit += compared(map, view.rectangle, view.size, comparison(r, view.size, offset));
+        direction = turned(direction);
+    }
+    return lit / float(SOFT_TAPS);
+}
+
 // -1 where nothing that hides a part of the disc is found: the penumbra is narrower than the search can see.
 float soft_visibility(MAP map, DEPTHS depths, View view, float radius, Receiver r) {
-    vec3 v = map_vector(view, r.texel), point = v * (frame.near / r.depth);
     float noise = fract(52.9829189 * fract(dot(gl_FragCoord.xy, vec2(0.06711056, 0.00583715))));  // Jimenez 2014
     vec2 start = vec2(cos(6.28318531 * noise), sin(6.28318531 * noise)), direction = start;
+    if (view.projection == PARALLEL_VIEW) return parallel_visibility(map, depths, view, radius, r, noise, start);
+    vec3 v = map_vector(view, r.texel), point = v * (frame.near / r.depth);
     // How close to the light lies what may hide a part of the disc? Taps at all scales, from all of the map on down over
     // nine octaves; for a disc four times as wide, so that they meet things of which only a rim is in the way.
     float nearest = blocker(depths, view, r, v, vec2(0.0), radius);

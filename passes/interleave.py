@@ -12,7 +12,7 @@ from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import put_shining_first
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.frame.vpl_buffer import DEFINES
+from deferred_ir.frame.vpl_buffer import DEFINES, VplsMeta
 from deferred_ir.frame.vpl_params import SHARES
 from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
@@ -68,7 +68,8 @@ class Interleave(Pass):
         """Shuffle and upload the VPLs, those without power last in each run of VPLs that one draw adds up."""
         del frame
         vpls, capacity = io["vpls"].records, io["vpls"].description
-        order = deal(vpls["tile"].astype(int), capacity.records)
+        points = io.meta("vpls", VplsMeta).points
+        order = deal(vpls["tile"].astype(int), capacity.records, points)
         parts = np.union1d(find_share_starts(len(vpls), self.params.n), np.arange(0, len(vpls), capacity.block))
         io["dealt"].write(put_shining_first(vpls[order], parts))
         io["block"].write(np.array([self.params.n], BLOCK))

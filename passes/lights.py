@@ -13,7 +13,7 @@ from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import AXES, LIGHTS_DROPPED, find_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.vpl_buffer import make_axes
-from deferred_ir.graph.facts import Facts
+from deferred_ir.graph.facts import NOTHING_KNOWN, Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Output
 from deferred_ir.scene.lights.base import LightView
@@ -26,9 +26,8 @@ class Lights(Pass):
     figures = (LIGHTS_DROPPED,)
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """One buffer."""
-        del inputs
-        return {"lights": describe_output(1)}
+        """Return what one spotlight needs."""
+        return self.outputs_for(NOTHING_KNOWN, inputs)
 
     def outputs_for(self, facts: Facts, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """One buffer, for as many lights as the scene has."""

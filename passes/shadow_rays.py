@@ -88,7 +88,8 @@ class ShadowRays(Pass):
         width, height = frame.size
         image = np.zeros((io["masks"].description.layers, height * width), np.uint32)
         if len(vpls):
-            words, _ = trace_masks(tracer, seen, read_vpls(vpls), read_limits(vpls), shares)
+            parallel = vpls["tan_half"] == 0
+            words, _ = trace_masks(tracer, seen, read_vpls(vpls), read_limits(vpls), shares, parallel=parallel)
             image[: len(words), place] = words
         io["masks"].upload(image.reshape(-1, height, width, 1))
         job = PixelJob(tracer, seen, frame.size, n, frame.seed)

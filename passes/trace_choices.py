@@ -17,7 +17,7 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
-from deferred_ir.rays.seen_points import find_seen
+from deferred_ir.rays.seen_points import PointsToSee, find_seen
 
 NOBODY = 0xFFFFFFFF
 """A choice of no VPL, as in shaders/lib/pool/list.glsl."""
@@ -61,7 +61,9 @@ class TraceChoices(Pass):
         choices = np.concatenate(
             [layer.reshape(-1, 4).take(samples.pixel, axis=0) for layer in io["choices"].read()], axis=1
         )
-        bits, rays = find_seen(tracer, samples, places.take(io["numbers"].read().reshape(-1), axis=0), choices, NOBODY)
+        numbers = io["numbers"].read().reshape(-1)
+        points = PointsToSee(places[numbers], vpls["z_axis"][numbers], vpls["tan_half"][numbers] == 0)
+        bits, rays = find_seen(tracer, samples, points, choices, NOBODY)
         image[samples.pixel] = bits
         io["seen"].upload(image.reshape(height, width, 1))
         io.count(RAYS.name, rays)

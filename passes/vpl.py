@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import LIGHTS_DROPPED
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.frame.vpl_buffer import MapVersions, describe_output, pack_vpls
+from deferred_ir.frame.vpl_buffer import MapVersions, describe_output, join_vpls, pack_vpls
 from deferred_ir.frame.vpl_params import VPLS_ALIVE, CastParams
 from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
-from deferred_ir.graph.ports import Description, Output
+from deferred_ir.graph.ports import Description, Input, Output
 from deferred_ir.sampling.patterns import warn_unbalanced
 from deferred_ir.vpls.cast import NONE, Vpls, cast
 from deferred_ir.vpls.resampling import estimate_effects, find_probes, resample
@@ -35,20 +35,22 @@ class Params(CastParams):
 
 
 class Vpl(Pass):
-    """Traces `count` rays from the spotlight, or more to choose from, and packs the VPLs for the shaders."""
+    """Traces `count` rays from the lights, or more to choose from, and packs the VPLs for the shaders."""
 
     Params = Params
     figures = (VPLS_ALIVE, LIGHTS_DROPPED)
     State = MapVersions
+    inputs: ClassVar[Mapping[str, Input]] = {
+        "points": Input("points of lights, which are VPLs of bounce 0", format="vpl", optional=True)
+    }
 
     def __init__(self, params: Any = None) -> None:
         super().__init__(params)
         warn_unbalanced(self.params.pattern, self.params.count)
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """One buffer with room for a VPL per ray and bounce."""
-        del inputs
-        return {"vpls": describe_output(self.params, self.params.bounces)}
+        """One buffer with room for the points of lights, and for a VPL per ray and bounce."""
+        return {"vpls": describe_output(self.params, self.params.bounces, inputs["points"])}
 
     def state_facts(self, facts: Facts) -> Statements:
         """State whether there may be VPLs, and whether they are clamped."""
@@ -69,8 +71,8 @@ class Vpl(Pass):
         """Cast, pack, upload."""
         p = self.params
         vpls = self._cast(frame) if p.count > 0 and frame.scene.emits else NONE
-        records = pack_vpls(frame.scene, vpls, p, np.arange(len(vpls)))
-        if frame.by_view and len(vpls):
+        records = join_vpls(io["points"], pack_vpls(frame.scene, vpls, p, np.arange(len(vpls))))
+        if frame.by_view and len(records):
             reaches = frame.seen_clusters.find_reaching(records)
             records["emission"][~reaches] = 0
             io.count(LIGHTS_DROPPED.name, int((~reaches).sum()))

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.frame.vpl_buffer import describe_output, pack_vpls
+from deferred_ir.frame.vpl_buffer import bring_near, describe_output, join_vpls, pack_vpls
 from deferred_ir.frame.vpl_params import AUTO_CLAMP, VPLS_ALIVE, CastParams
 from deferred_ir.graph.facts import Facts, Statements
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
-from deferred_ir.graph.ports import Buffer, Description, Output, Texture
+from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture
 from deferred_ir.pool.effort import describe_effort
 from deferred_ir.pool.proposals import GROUPS, draw_members, order_along_curve, share_power
 from deferred_ir.sampling import streams
@@ -35,7 +36,7 @@ class Params(CastParams):
 
     @property
     def pool(self) -> int:
-        """Rays that leave the spotlight: `candidates` for each of `count`, but no more than MOST, or `count` itself."""
+        """Rays that leave the lights: `candidates` for each of `count`, but no more than MOST, or `count` itself."""
         return max(min(self.count * self.candidates, MOST), self.count)
 
     @property
@@ -49,11 +50,14 @@ class VplPool(Pass):
 
     Params = Params
     figures = (VPLS_ALIVE,)
+    inputs: ClassVar[Mapping[str, Input]] = {
+        "points": Input("points of lights, which are VPLs of bounce 0", format="vpl", optional=True)
+    }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return a buffer with room for a VPL per ray and bounce, the same as a texture, and a texture of groups."""
-        del inputs
-        vpls = describe_output(replace(self.params, count=self.params.pool), self.params.bounces)
+        own = replace(self.params, count=self.params.pool)
+        vpls = describe_output(own, self.params.bounces, inputs["points"])
         vpls = replace(vpls, defines={**vpls.defines, "POOL_EDGE": self.params.limits(1.0).cosine})
         which = "one VPL of each group, its power that of the group over the pool's: position, power; normal, clamp^2"
         assert isinstance(vpls.description, Buffer)
@@ -89,9 +93,10 @@ class VplPool(Pass):
         vpls = NONE
         if p.count > 0 and frame.scene.emits:
             vpls = cast(frame.scene.emitters, frame.tracer(), p.pool, p.pattern, frame.seed, bounces=p.bounces)
-        records = pack_vpls(frame.scene, vpls, p, np.zeros(len(vpls), int))
+        records = join_vpls(io["points"], pack_vpls(frame.scene, vpls, p, np.zeros(len(vpls), int)))
         records = records[order_along_curve(records["position"], records["z_axis"])]
         io["vpls"].write(records)
+        records = bring_near(records, frame.scene.bounds.radius)
         shares, within = share_power(records["emission"] @ LUMINANCE)
         io["pool"].upload(_pack_pool(records, within, io["pool"].size[1]))
         io["groups"].upload(

@@ -57,6 +57,10 @@ void main() {
     float far = reach + largest(corner);
     for (int i = first; i < min(first + LIGHT_GROUP, count); ++i) {
         if (vpls[i].emission == vec3(0.0)) continue;
+        if (vpls[i].tan_half == 0.0) {  // at infinity
+            tiles[(i - first) / 32] |= 1u << (i & 31);
+            continue;
+        }
         vec3 x = vpls[i].x_axis, y = vpls[i].y_axis, z = vpls[i].z_axis, from = frame.camera - vpls[i].position;
         vec3 ax = along_rays(x), ay = along_rays(y), az = along_rays(z);
         float slack = margin * (far + largest(vpls[i].position));

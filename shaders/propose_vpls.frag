@@ -20,7 +20,7 @@ float score(int group, Sample probes[4], float extent) {
     float sum = 0.0, around = 0.0;
     for (int i = 0; i < 4; ++i) {
         Sample s = probes[i];
-        vec3 from = s.position - at.xyz;
+        vec3 from = way_from(at.xyz, normal.xyz, s.position, normal.w);
         float brings = vpl_kernel(from, normal.xyz, s.normal, s.shading_normal, POOL_EDGE, normal.w) * area;
         float near = area / max(dot(from, from), max(0.25 * extent, max(normal.w, TINY)));
         brings = s.depth > 0.0 ? min(brings, 1e15) : 0.0;  // its square is a float

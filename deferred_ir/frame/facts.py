@@ -15,7 +15,7 @@ DIRECT_LIGHTS = Fact("direct_lights", unknown=1, doc="Lights that shaders evalua
 VIEWS = Fact[Sequence[int]](
     "views", unknown=(0,), doc="Of each shadow map of direct lights, how often its edge is halved."
 )
-SAMPLED = Fact("sampled", unknown=True, doc="Lights shine for which points stand.", needs=True)
+SAMPLED = Fact("sampled", unknown=True, doc="Lights shine for which points stand.")
 ENVIRONMENT = Fact(
     "environment", unknown=True, doc="There is light from all around, to see behind everything.", needs=True
 )

@@ -59,7 +59,8 @@ class SeenClusters:
 
         records: VPL (n,), or others with the axes of a view that is as wide as the light's cone.
         """
-        reaches = np.zeros(len(records), bool)
+        pyramids = records.dtype == AXES
+        reaches: Bools = np.zeros(len(records), bool) if pyramids else records["tan_half"] == 0  # from infinity
         for some in (self.chosen[::STRIDE], self.chosen):
             left = np.flatnonzero(~reaches)
             if not len(left):

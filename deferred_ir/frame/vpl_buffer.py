@@ -10,13 +10,15 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.base.versions import new_versions
 from deferred_ir.frame.vpl_params import VplParams
-from deferred_ir.graph.ports import Buffer, Output
+from deferred_ir.gl.buffers import GpuBuffer
+from deferred_ir.graph.ports import Buffer, Description, Output
 from deferred_ir.sampling.warps import build_basis
 from deferred_ir.scene.geometry import Geometry
 from deferred_ir.scene.lights.spotlight import one_minus_cos
 from deferred_ir.scene.scene import Scene
 from deferred_ir.vpls.cast import Vpls
 from deferred_ir.vpls.kernel import VplLimits
+from deferred_ir.vpls.sample_lights import PointSet
 
 VPL = np.dtype(
     [
@@ -38,6 +40,13 @@ BINDING = 1
 VPLS_PER_BLOCK = 192
 """VPLs in a uniform block: OpenGL promises 16 KiB (204 VPLs), and blocks must start at multiples of 256 bytes."""
 
+HEMISPHERE = 1.0
+"""1 - cos of the half cone angle of points of lights, which shine into the whole hemisphere."""
+POINT_FOV = 179.9
+"""Opening angle of their maps, degrees."""
+MARGIN = 1.001
+"""By which a parallel view is larger than the scene's bounds."""
+
 ROUNDINGS = 8
 """Distance between a VPL and its surface, in roundings of a 32-bit coordinate: positions and products are rounded."""
 
@@ -46,17 +55,20 @@ ROUNDINGS = 8
 class VplsMeta:
     """What is known of a buffer of VPLs before it is filled.
 
-    params: parameters of the VPLs. bounces: most diffuse bounces of a path that makes one.
+    params: parameters of the VPLs. bounces: most diffuse bounces of a path that makes one. points: room for points of
+    lights, whose tiles come first.
     """
 
     params: VplParams
     bounces: int
+    points: int = 0
 
 
-def describe_output(params: VplParams, bounces: int = 1) -> Output:
-    """Return the port of a buffer with room for `params.count` VPLs of each bounce."""
-    vpls = Buffer("vpl", params.count * bounces, VPL.itemsize, VPLS_PER_BLOCK, binding=BINDING)
-    return Output("VPLs in the order of their tiles", vpls, DEFINES, meta=VplsMeta(params, bounces))
+def describe_output(params: VplParams, bounces: int = 1, points: Description | None = None) -> Output:
+    """Return the port of a buffer with room for `points` of lights, if any, and `params.count` VPLs of each bounce."""
+    first = points.records if isinstance(points, Buffer) else 0
+    vpls = Buffer("vpl", first + params.count * bounces, VPL.itemsize, VPLS_PER_BLOCK, binding=BINDING)
+    return Output("VPLs in the order of their tiles", vpls, DEFINES, meta=VplsMeta(params, bounces, first))
 
 
 DEFINES = {"VPLS_BINDING": BINDING, "VPLS_PER_BLOCK": VPLS_PER_BLOCK}
@@ -72,6 +84,44 @@ def pack_vpls(scene: Scene, vpls: Vpls, params: VplParams, tiles: Ints) -> np.nd
     records["one_minus_cos"] = one_minus_cos(params.fov)
     fill_view(records, vpls.normal, params.fov)
     return records
+
+
+def pack_points(scene: Scene, points: PointSet) -> np.ndarray:
+    """Return VPL records (n,) of points of lights, in tiles 0, 1, ...: not clamped, into the whole hemisphere."""
+    records, bounds = np.zeros(len(points), VPL), scene.bounds
+    records["position"] = lift_off_surface(scene, points.position, points.normal)
+    records["emission"], records["tile"] = points.emission, np.arange(len(points))
+    records["one_minus_cos"] = HEMISPHERE
+    fill_view(records, points.normal, POINT_FOV)
+    rows = np.flatnonzero(points.parallel)
+    if len(rows):
+        parallel = records[rows]
+        reach = bounds.radius * MARGIN
+        parallel["position"] = np.asarray(bounds.centre) - points.normal[rows] * reach
+        fill_parallel_view(parallel, points.normal[rows], reach, 2 * reach)
+        records[rows] = parallel
+    return records
+
+
+def join_vpls(points: GpuBuffer | None, vpls: np.ndarray) -> np.ndarray:
+    """Return the records of points of lights, if there are any, and of VPLs (n,), in tiles behind those."""
+    if points is None:
+        return vpls
+    vpls = vpls.copy()
+    vpls["tile"] += points.description.records
+    return np.concatenate([points.records, vpls]) if len(points.records) else vpls
+
+
+def bring_near(records: np.ndarray, distance: float) -> np.ndarray:
+    """Return VPL records (n,) with those at infinity as lights at a `distance` that is the same everywhere.
+
+    So all emissions have one unit. clamp_squared says which they are: minus the square of the distance.
+    """
+    near = records.copy()
+    rows = records["tan_half"] == 0
+    near["emission"][rows] *= np.float32(distance**2)
+    near["clamp_squared"][rows] = -(distance**2)
+    return near
 
 
 def fill_view(records: np.ndarray, axis: Array, fov: float) -> None:
@@ -108,8 +158,19 @@ def read_vpls(records: np.ndarray) -> Vpls:
     return Vpls(records["position"], records["z_axis"], emission, np.arange(len(records)))
 
 
+def describe_points(count: int) -> Output:
+    """Return the port of a buffer of `count` points of lights."""
+    points = Buffer("vpl", count, VPL.itemsize)
+    return Output("points that stand for lights which have an area or lie all around", points)
+
+
 def read_limits(records: np.ndarray) -> VplLimits:
-    """Return cone and clamp of the VPLs in VPL records (n,), n > 0, in the precision in which shaders read them."""
+    """Return cone and clamp of the VPLs in VPL records (n,), n > 0, in the precision in which shaders read them.
+
+    Points of lights, which have neither, do not count where there are others.
+    """
+    others = records[records["one_minus_cos"] < HEMISPHERE]
+    records = others if len(others) else records
     return VplLimits(clamp=math.sqrt(records["clamp_squared"][0]), cosine=1 - float(records["one_minus_cos"][0]))
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Literal
 
-from deferred_ir.frame.facts import EMITS
+from deferred_ir.frame.facts import EMITS, SAMPLED
 from deferred_ir.graph.facts import Fact, Facts, Statements
 from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.params import param
@@ -25,7 +25,7 @@ VPLS_ALIVE = Figure("vpls_alive", "VPLs that shine.", ("vpls_alive",))
 
 def explain_no_vpls(facts: Facts) -> str | None:
     """Return why a pass that works on VPLs is not needed; None if there may be VPLs."""
-    return None if facts[VPLS] else "there are no VPLs: vpl.count is 0, or the spotlight emits nothing"
+    return None if facts[VPLS] else "there are no VPLs: vpl.count is 0, or nothing shines"
 
 
 FULL_CONE = 179.0
@@ -39,9 +39,7 @@ room and a cathedral, and flat about there (half or twice of it costs a tenth to
 class VplParams:
     """Parameters of VPLs, wherever they come from."""
 
-    count: int = param(
-        64, lo=0, hi=65536, role="vpls", doc="Rays that leave the spotlight; each that lands makes a VPL."
-    )
+    count: int = param(64, lo=0, hi=65536, role="vpls", doc="Rays that leave the lights; each that lands makes a VPL.")
     fov: float = param(150.0, lo=1.0, hi=179.9, doc="Full opening angle of the cone a VPL shines into, degrees.")
     clamp: float | Literal["auto"] = param(
         0.02,
@@ -61,9 +59,9 @@ class VplParams:
 
     def state_facts(self, facts: Facts) -> Statements:
         """State whether VPLs may shine, from the facts of the scene, and what limits their light."""
-        vpls = self.count > 0 and facts[EMITS]
-        clamp = self.clamp_fraction
-        return {VPLS: vpls, CLAMPED: vpls and clamp > 0, CLAMP: clamp, CONE: self.fov}
+        cast, clamp = self.count > 0 and facts[EMITS], self.clamp_fraction
+        points = facts[SAMPLED] and facts[EMITS]
+        return {VPLS: cast or points, CLAMPED: cast and clamp > 0, CLAMP: clamp, CONE: self.fov}
 
     def explain_lost_light(self, facts: Facts) -> str | None:
         """Return how VPLs lose light in all frames alike, None if they do not."""

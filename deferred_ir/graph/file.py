@@ -143,6 +143,7 @@ def _read(path: Path, above: tuple[Path, ...], passes: Mapping[str, type[Pass]])
             raise GraphError(f"{path.name}: passes.{name}: nothing to remove{did_you_mean(name, known)}")
         del base["passes"][name], table["passes"][name]
         _unwire(base["passes"], name)
+    _unwire_other_types(base.get("passes", {}), table.get("passes", {}), passes)
     table = _with_new_names(path, table, base, passes)
     return _cut(_overlay(base, {key: value for key, value in table.items() if key != "extends"}))
 
@@ -154,6 +155,15 @@ def _unwire(tables: Mapping[str, Any], removed: str) -> None:
         if isinstance(wires, dict):
             for port in [port for port, source in wires.items() if str(source).partition(".")[0] == removed]:
                 del wires[port]
+
+
+def _unwire_other_types(base: Mapping[str, Any], top: Mapping[str, Any], passes: Mapping[str, type[Pass]]) -> None:
+    """Where `top` gives a pass another type, cut the inputs that it has in `base` and the new type does not know."""
+    for name, entry in top.items():
+        below, kind = base.get(name), entry.get("type") if isinstance(entry, dict) else None
+        found = _pass(kind, passes) if isinstance(kind, str) else None
+        if found and isinstance(below, dict) and isinstance(below.get("inputs"), dict):
+            below["inputs"] = {port: source for port, source in below["inputs"].items() if port in found.inputs}
 
 
 def _with_new_names(

@@ -29,6 +29,11 @@ def dealing(seed: int) -> Stream:
     return np.random.default_rng([seed, 0, 3])
 
 
+def light_points(seed: int) -> int:
+    """Return the pattern's seed for points that stand for lights."""
+    return seed + 15485863
+
+
 def light_disc_pattern(seed: int) -> int:
     """Return the pattern's seed for points on the light's disc; that of the directions is `seed` itself."""
     return seed + 104729

@@ -9,6 +9,7 @@ import numpy as np
 
 from deferred_ir.frame.direct_lights import VIEWS_PER_LIGHT, list_kinds
 from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.vpl_buffer import HEMISPHERE
 
 Defines = dict[str, int | float | str]
 
@@ -18,8 +19,8 @@ def choose_for_pixels(frame: Frame, vpls: np.ndarray) -> Defines:
     lights there is among them: PARALLEL ones, from infinity, and MIXED projections of maps.
     """
     clamped = frame.keep_all or not len(vpls) or bool((vpls["clamp_squared"] > 0).any())
-    parallel = frame.keep_all or bool((vpls["tan_half"] == 0).any())
-    mixed = parallel or bool((vpls["one_minus_cos"] >= 1).any())
+    parallel = frame.keep_all or bool(len(vpls) and (vpls["tan_half"] == 0).any())
+    mixed = parallel or bool(len(vpls) and (vpls["one_minus_cos"] >= HEMISPHERE).any())
     return {"SMOOTH": int(frame.smooth), "CLAMPED": int(clamped), "PARALLEL": int(parallel), "MIXED": int(mixed)}
 
 

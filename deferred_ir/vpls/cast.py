@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from typing import TypeVar
 
 import numpy as np
 
@@ -27,6 +28,8 @@ from deferred_ir.sampling.patterns import Pattern, resample_systematically, samp
 from deferred_ir.sampling.warps import lift_to_hemisphere, square_to_disc
 from deferred_ir.scene.lights.base import Bounds, Light
 from deferred_ir.vpls.kernel import cosine_ratio
+
+L = TypeVar("L", bound=Light)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +78,14 @@ def cast(
         carried = last.emission[drawn] * (power.sum() / (rays * power[drawn]))[:, None]
         directions = lift_to_hemisphere(square_to_disc(square), normal)
         by_bounce.append(_make_vpls(tracer, tracer.lift(last.position[drawn], normal), directions, carried))
-    if len(by_bounce) == 1:
-        return by_bounce[0]
-    return Vpls(*(np.concatenate([getattr(part, f.name) for part in by_bounce]) for f in fields(Vpls)))
+    return join(by_bounce)
+
+
+def join(parts: Sequence[Vpls]) -> Vpls:
+    """Return the VPLs of all parts, of which there is one at least."""
+    if len(parts) == 1:
+        return parts[0]
+    return Vpls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Vpls)))
 
 
 def _start_rays(
@@ -100,7 +108,7 @@ def _start_rays(
     return origins, directions, carried
 
 
-def deal_rays(lights: Sequence[Light], bounds: Bounds, count: int, seed: int) -> Iterator[tuple[Light, slice, float]]:
+def deal_rays(lights: Sequence[L], bounds: Bounds, count: int, seed: int) -> Iterator[tuple[L, slice, float]]:
     """Deal `count` rays to lights by flux. Yields each light that gets some, which, and a factor on what they carry.
 
     A light that should get less than one ray gets one in some frames, and then carries as much more.

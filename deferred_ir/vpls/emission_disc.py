@@ -1,4 +1,7 @@
-"""Map a spotlight's directions to a disc on which equal areas get equal light.
+"""Map a light's directions to a disc on which equal areas get equal light.
+
+A point's sphere of directions is mapped by Lambert's azimuthal projection; the disc's rim is one direction. A
+spotlight's cone takes more:
 
 Nusselt's analogue, uniform on the disc of radius sin(fov/2), accounts for the light's cosine but not for the soft edge
 of its cone. Here radii are stretched to account for both: any region of the disc gets exactly the fraction of the light
@@ -10,16 +13,19 @@ is proportional to
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from deferred_ir.base.arrays import Array
+from deferred_ir.scene.lights.point import Point
 from deferred_ir.scene.lights.spotlight import Spotlight, one_minus_cos
 
 FLAT = 0.75
 """x at which the soft edge begins."""
 
 
-class EmissionDisc:
+class SpotlightDisc:
     """The unit disc of the directions of `light`. axes: (2, 3), two unit vectors that span its plane."""
 
     def __init__(self, light: Spotlight, axes: Array) -> None:
@@ -80,3 +86,61 @@ class EmissionDisc:
                 low, high = np.where(below, middle, low), np.where(below, high, middle)
             x[soft] = high
         return x
+
+
+class PointDisc:
+    """The unit disc of all directions. axes: (2, 3), two unit vectors; their cross product lies in its middle."""
+
+    power = 4.0
+
+    def __init__(self, axes: Array) -> None:
+        self._axes, self._axis = axes, np.cross(axes[0], axes[1])
+
+    def inside(self, directions: Array) -> np.ndarray:
+        """Return whether unit directions (n, 3) get light: all do."""
+        return np.ones(len(directions), bool)
+
+    def project(self, directions: Array) -> Array:
+        """Return the points (n, 2) of the disc to which unit directions (n, 3) belong."""
+        across = directions @ self._axes.T
+        length = np.linalg.norm(across, axis=1)
+        radius = np.linalg.norm(directions - self._axis, axis=1) / 2  # sqrt((1 - cos) / 2)
+        points: Array = across * np.divide(radius, length, out=np.zeros(len(length)), where=length > 0)[:, None]
+        return points
+
+    def unproject(self, points: Array) -> Array:
+        """Return the unit directions (n, 3) that belong to points (n, 2) of the disc."""
+        square = np.minimum((points**2).sum(axis=1), 1)[:, None]
+        directions: Array = 2 * np.sqrt(1 - square) * (points @ self._axes) + (1 - 2 * square) * self._axis
+        return directions
+
+
+class EmissionDisc(Protocol):
+    """The disc of a light's directions."""
+
+    @property
+    def power(self) -> float:
+        """The light's flux over its emission and pi."""
+
+    def inside(self, directions: Array) -> np.ndarray:
+        """Return whether unit directions (n, 3) get light, bool (n,)."""
+
+    def project(self, directions: Array) -> Array:
+        """Return the points (n, 2) of the disc to which unit directions (n, 3) that get light belong."""
+
+    def unproject(self, points: Array) -> Array:
+        """Return the unit directions (n, 3) that belong to points (n, 2) of the disc."""
+
+
+KeptLight = Spotlight | Point
+"""Lights that have such a disc."""
+
+
+def find_axis(light: KeptLight) -> Array:
+    """Return the unit direction in the middle of the light's disc, (3,)."""
+    return light.axis if isinstance(light, Spotlight) else np.array([0.0, 0.0, 1.0])
+
+
+def make_disc(light: KeptLight, axes: Array) -> EmissionDisc:
+    """Return the disc of a light. axes: (2, 3), two unit vectors that span its plane."""
+    return SpotlightDisc(light, axes) if isinstance(light, Spotlight) else PointDisc(axes)

@@ -1,6 +1,7 @@
-"""VPLs that outlive their frame while the spotlight moves (Laine et al. 2007, "Incremental Instant Radiosity", EGSR).
+"""VPLs that outlive their frame while their light, a spotlight or a point, moves (Laine et al. 2007, "Incremental
+Instant Radiosity", EGSR).
 
-Each VPL has a site in the disc of the spotlight's directions, on which equal areas get equal light. In each frame the
+Each VPL has a site in the disc of the light's directions, on which equal areas get equal light. In each frame the
 sites that the light no longer reaches are removed, and a few new ones fill the largest holes. Each carries the light of
 its Voronoi cell, so all of the light is accounted for however many sites there are.
 
@@ -22,10 +23,9 @@ from deferred_ir.sampling import streams
 from deferred_ir.sampling.disc_voronoi import VoronoiCells, find_most_crowded
 from deferred_ir.sampling.warps import build_basis
 from deferred_ir.sampling.warps import square_to_disc as unit_disc
-from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.vertices import transform_points
 from deferred_ir.vpls.cast import Vpls
-from deferred_ir.vpls.emission_disc import EmissionDisc
+from deferred_ir.vpls.emission_disc import EmissionDisc, KeptLight, find_axis, make_disc
 from deferred_ir.vpls.kernel import cosine_ratio
 from deferred_ir.vpls.stale_maps import StaleMaps
 
@@ -64,14 +64,14 @@ class IncrementalVpls:
         # VPLs on moving models are shaded from where their map was last drawn, until it is redrawn.
         self.shaded_position, self.shaded_normal = np.zeros((2, count, 3))
 
-    def update(self, light: Spotlight, tracer: Tracer, *, least: int, most: int) -> Vpls:
+    def update(self, light: KeptLight, tracer: Tracer, *, least: int, most: int) -> Vpls:
         """Advance to the next frame. Returns its VPLs, `ray` being their slots.
 
         most: new and stale maps that the frame may draw; 1 in RESERVED is for stale ones, if there are any. least:
         sites that may be new or moved to where they are of more use, within `most`.
         """
         self._turn_basis(light)
-        disc = EmissionDisc(light, self._axes(light))
+        disc = make_disc(light, self._axes(light))
         self._begin_frame(light, tracer, disc)
         budget, most = most, most - min(most // RESERVED, int(self._maps.stale.sum()))
         slots = np.flatnonzero(self.used)
@@ -101,7 +101,7 @@ class IncrementalVpls:
         """How many sites the budget has not allowed so far."""
         return int((~self.used).sum())
 
-    def _begin_frame(self, light: Spotlight, tracer: Tracer, disc: EmissionDisc) -> None:
+    def _begin_frame(self, light: KeptLight, tracer: Tracer, disc: EmissionDisc) -> None:
         """Move VPLs with their models, remove those that the light no longer reaches, and age the others' maps."""
         geometry = tracer.scene.geometry
         moves = self._maps.follow(geometry)
@@ -126,20 +126,21 @@ class IncrementalVpls:
         alive: Bools = self.used & self.landed & (self.albedo > 0).any(axis=1)
         return alive
 
-    def _turn_basis(self, light: Spotlight) -> None:
+    def _turn_basis(self, light: KeptLight) -> None:
         """Turn the disc's basis along with the axis, so that points of a disc light keep their places on it."""
-        right = self._right - (self._right @ light.axis) * light.axis
+        axis = find_axis(light)
+        right = self._right - (self._right @ axis) * axis
         length = np.linalg.norm(right)
-        self._right = right / length if length > 0.1 else build_basis(light.axis)[0]
+        self._right = right / length if length > 0.1 else build_basis(axis)[0]
 
-    def _axes(self, light: Spotlight) -> Array:
-        return np.stack([self._right, np.cross(light.axis, self._right)])
+    def _axes(self, light: KeptLight) -> Array:
+        return np.stack([self._right, np.cross(find_axis(light), self._right)])
 
-    def _origins(self, light: Spotlight) -> Array:
+    def _origins(self, light: KeptLight) -> Array:
         origins: Array = np.asarray(light.position, float) + light.radius * self.start @ self._axes(light)
         return origins
 
-    def _find_reached(self, light: Spotlight, tracer: Tracer, disc: EmissionDisc) -> Bools:
+    def _find_reached(self, light: KeptLight, tracer: Tracer, disc: EmissionDisc) -> Bools:
         """Update the sites' directions, and return which of those in use the light still reaches, bool (count,)."""
         chosen = np.flatnonzero(self.used & self.landed)
         origins = self._origins(light)
@@ -188,7 +189,7 @@ class IncrementalVpls:
             count = worth
         return cells, []
 
-    def _shoot(self, light: Spotlight, tracer: Tracer, slots: Ints, directions: Array) -> None:
+    def _shoot(self, light: KeptLight, tracer: Tracer, slots: Ints, directions: Array) -> None:
         """Trace a ray along each of `directions` (m, 3) and store what it hits in `slots` (m,)."""
         order = self._born + np.arange(len(slots))
         self._born += len(slots)
@@ -201,7 +202,7 @@ class IncrementalVpls:
         self.normal[slots], self.shading_normal[slots] = hits.normal, hits.shading_normal
         self.version[slots] = new_versions(len(slots))
 
-    def _make_vpls(self, light: Spotlight, power: float) -> Vpls:
+    def _make_vpls(self, light: KeptLight, power: float) -> Vpls:
         """Return the VPLs that are alive, each with the light of its cell."""
         slots = np.flatnonzero(self._find_alive())
         direction = self.direction[slots]

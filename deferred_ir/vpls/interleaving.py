@@ -24,13 +24,26 @@ class SharesMeta:
     n: int
 
 
-def deal(slots: Ints, capacity: int) -> Ints:
+def deal(slots: Ints, capacity: int, points: int = 0) -> Ints:
     """Return the order in which VPLs are dealt to the shares, int (n,).
 
     slots: int (n,), different numbers below `capacity`, one for each VPL. The order is shuffled, so that what a share
     takes of the sample pattern has no structure, and it goes by slots: where VPLs come and go, the others keep their
-    order, and all but a few their shares.
+    order, and all but a few their shares. Slots below `points` are dealt by themselves: each share gets as many.
     """
+    first = np.flatnonzero(slots < points)
+    if not len(first):
+        return _shuffle(slots - points, capacity - points)
+    others = np.flatnonzero(slots >= points)
+    first = first[_shuffle(slots[first], points)]
+    others = others[_shuffle(slots[others] - points, capacity - points)]
+    # Both evenly from beginning to end.
+    place = np.concatenate([(np.arange(len(part)) + 0.5) / max(len(part), 1) for part in (first, others)])
+    return np.concatenate([first, others])[np.argsort(place, kind="stable")]
+
+
+def _shuffle(slots: Ints, capacity: int) -> Ints:
+    """Return the order of `slots` (n,) in a permutation of all `capacity` of them, int (n,)."""
     ranks = np.empty(capacity, np.intp)
     ranks[np.random.Generator(np.random.PCG64(SHUFFLE)).permutation(capacity)] = np.arange(capacity)
     return np.argsort(ranks[slots])

@@ -16,6 +16,7 @@ from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.shadows import shader_variants
 from deferred_ir.shadows.filter import ShadowFilter
 
 FOLDER = Path(__file__).parent
@@ -61,7 +62,9 @@ class VisibilityPairs(Pass):
             return  # there is no VPL
         io["lights"].bind()
         io["views"].bind()
-        program = io.program("visibility.frag", defines={"DISC": 0, **self.params.defines()})
+        defines = shader_variants.choose_for_lights(frame, io["lights"].records, io["views"].records)
+        defines |= shader_variants.choose_for_pixels(frame, vpls.records) | self.params.defines()
+        program = io.program("visibility.frag", defines=defines | {"DISC": 0})
         program.set(direct=direct, total=total, seed=frame.seed % 2**32)
         for start in range(0, 1 if direct else total, VPLS_PER_BLOCK):
             vpls.bind(start // VPLS_PER_BLOCK)

@@ -38,7 +38,7 @@ def offsets(record: np.dtype) -> dict[str, int]:
 
 
 def test_records_are_vec4_of_std140():
-    assert (LIGHT.itemsize, VPL.itemsize, VIEW.itemsize) == (3 * 16, 5 * 16, 5 * 16)
+    assert (LIGHT.itemsize, VPL.itemsize, VIEW.itemsize) == (4 * 16, 5 * 16, 5 * 16)
     assert [offsets(LIGHT)[name] for name in ("position", "axis", "emission")] == [0, 16, 32]
     axes = ("x_axis", "y_axis", "z_axis")
     assert [offsets(VPL)[name] for name in ("position", *axes, "emission")] == [16 * i for i in range(5)]

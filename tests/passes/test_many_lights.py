@@ -108,6 +108,6 @@ def test_a_dark_spotlight_gives_black_without_drawing_maps(renderer, graph):
     assert image.display.max() == 0
     left_out = one.plan(scene, 16).left_out
     assert left_out.pop("cull_lights", "there are no VPLs").startswith("there are no VPLs")
-    assert left_out == {"shadow_maps": "no light needs one: the spotlight emits nothing"}
+    assert left_out["shadow_maps"] == "no light needs one: nothing shines"
     assert one.executor.counters["maps_drawn"] == 0
     assert one.render(room(), vpls=16).radiance.max() > 0  # and back

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_scenes import build, plane, room, scaled, smooth_scene, sphere
 
-from deferred_ir.rays.direct import trace_spotlight
+from deferred_ir.rays.direct import trace_direct
 from deferred_ir.rays.pixel_surfaces import PixelJob, Surfaces
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
@@ -29,7 +29,7 @@ def lit(scene, *, seed=0, samples=4, block=4, threads=None):
     hits = PathTracer(scene, tracer).trace_camera_rays(SIZE)
     rows = np.flatnonzero(hits.hit)
     seen = Surfaces(rows, *(getattr(hits, name)[rows] for name in ("position", "normal", "shading_normal")))
-    return trace_spotlight(PixelJob(tracer, seen, SIZE, block, seed, threads), samples=samples)
+    return trace_direct(PixelJob(tracer, seen, SIZE, block, seed, threads), samples=samples)[..., 0]
 
 
 def truth(scene, spp=256):
@@ -103,11 +103,11 @@ def test_no_light_on_the_background_beside_the_cone_or_behind():
     places = np.array([[0.0, -0.6, 0.0], [0.9, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.6, 0.0], [0.0, 0.6, 0.0]])
     normals = np.array([[0, 1, 0], [0, 1, 0], [0, -1, 0], [0, -1, 0], [0, 1, 0]], float)
     seen = Surfaces(np.arange(5), places, normals, np.tile([0.0, 1.0, 0.0], (5, 1)))
-    found = trace_spotlight(PixelJob(tracer, seen, (5, 1)), samples=4)[0]
+    found = trace_direct(PixelJob(tracer, seen, (5, 1)), samples=4)[0, :, 0]
     np.testing.assert_array_equal(found > 0, [False, False, False, False, True])
 
 
 def test_nothing_seen_is_no_trouble():
     scene = soft()
     nobody = Surfaces(np.zeros(0, int), *[np.zeros((0, 3), np.float32)] * 3)
-    assert not trace_spotlight(PixelJob(Tracer(scene), nobody, SIZE, 4), samples=4).any()
+    assert not trace_direct(PixelJob(Tracer(scene), nobody, SIZE, 4), samples=4).any()

@@ -53,7 +53,7 @@ def test_what_could_not_run_is_told_without_figures(renderer):
     """A dark spotlight needs no maps, and maps of so many VPLs would not fit."""
     dark = replace(room(), lights=(replace(room().spotlight, emission=(0.0, 0.0, 0.0)),))
     found, _ = told(renderer, dark, "deferred", **{"vpl.count": 65536})
-    assert found["shadow_maps"].why == "no light needs one: the spotlight emits nothing"
+    assert found["shadow_maps"].why == "no light needs one: nothing shines"
     assert found["shadow_maps"].ms is found["shadow_maps"].bytes is None
 
 

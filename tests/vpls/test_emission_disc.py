@@ -11,14 +11,14 @@ from closed_forms import mean_cone_factor
 from deferred_ir.sampling.patterns import sample_unit_disc
 from deferred_ir.sampling.warps import build_basis, lift_to_hemisphere, square_to_disc
 from deferred_ir.scene.lights.spotlight import Spotlight
-from deferred_ir.vpls.emission_disc import EmissionDisc
+from deferred_ir.vpls.emission_disc import SpotlightDisc
 
 FOVS = [0.1, 30.0, 100.0, 160.0, 179.99]
 
 
 def make_disc(fov):
     light = Spotlight((0.3, 0.2, 0.1), (1.0, -2.0, 0.4), fov)
-    return light, EmissionDisc(light, np.stack(build_basis(light.axis)))
+    return light, SpotlightDisc(light, np.stack(build_basis(light.axis)))
 
 
 @pytest.mark.parametrize("fov", FOVS)

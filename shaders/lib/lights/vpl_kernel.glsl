@@ -5,6 +5,12 @@
 #define CLAMPED 1
 #endif
 
+// The way from a VPL to a surface. For one at infinity `clamp_squared` is below 0: minus the square of a distance at which
+// it would bring the same light everywhere.
+vec3 way_from(vec3 vpl_position, vec3 vpl_normal, vec3 position, float clamp_squared) {
+    return clamp_squared < 0.0 ? vpl_normal * sqrt(-clamp_squared) : position - vpl_position;
+}
+
 // from: from the VPL to the surface. edge: cosine of half the cone's angle. No root: this is the innermost loop.
 float vpl_kernel(vec3 from, vec3 vpl_normal, vec3 normal, vec3 shading_normal, float edge, float clamp_squared) {
     float square = dot(from, from);

@@ -7,7 +7,7 @@ struct Entry {
     vec3 position;
     float power;          // its luminous power over the pool's, times its weight; 0: no VPL
     vec3 normal;
-    float clamp_squared;
+    float clamp_squared;  // below 0: at infinity
 };
 
 Entry read_entry(sampler2D positions, sampler2D normals, int tile, int number) {
@@ -16,5 +16,6 @@ Entry read_entry(sampler2D positions, sampler2D normals, int tile, int number) {
 }
 
 float entry_kernel(Entry entry, vec3 position, vec3 normal, vec3 shading_normal) {
-    return vpl_kernel(position - entry.position, entry.normal, normal, shading_normal, POOL_EDGE, entry.clamp_squared);
+    vec3 from = way_from(entry.position, entry.normal, position, entry.clamp_squared);
+    return vpl_kernel(from, entry.normal, normal, shading_normal, POOL_EDGE, entry.clamp_squared);
 }

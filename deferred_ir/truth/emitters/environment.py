@@ -32,7 +32,7 @@ class EnvironmentTwin(Twin):
     def emission(self) -> Array:
         """Its radiance, or the factor on that of its image."""
         factor = (1.0, 1.0, 1.0) if self.light.radiance is None else self.light.radiance
-        return np.multiply(factor, self.light.scale)
+        return np.asarray(factor) * float(self.light.scale)
 
     @property
     def power(self) -> float:

@@ -28,7 +28,8 @@ class RectTwin(FlatTwin):
     def covers(self, places: Array) -> Bools:
         """Return which places lie on it."""
         across, along = self.light.size
-        return (np.abs(places[:, 0]) <= across / 2) & (np.abs(places[:, 1]) <= along / 2)
+        inside: Bools = (np.abs(places[:, 0]) <= across / 2) & (np.abs(places[:, 1]) <= along / 2)
+        return inside
 
 
 TWIN = RectTwin

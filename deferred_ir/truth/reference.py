@@ -41,15 +41,17 @@ ONE_SAMPLE = "a single sample a pixel cannot tell its own error; take more"
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """A reference: radiance, direct and indirect, float32 (H, W, 3), linear RGB, top row first as in image files.
+    """A reference: radiance and the parts that it is the sum of, float32 (H, W, 3), linear RGB, top row first.
 
-    hit: where the camera ray hits a surface, bool (H, W). standard_error: that of each value of `radiance`, float32
-    (H, W, 3), or None if it is unknown (`meta["note"]` says why). meta: the content of OUT.json.
+    emission: what the camera sees shining itself, the environment behind all included. hit: where the camera ray hits a
+    surface, bool (H, W). standard_error: that of each value of `radiance`, float32 (H, W, 3), or None if it is unknown
+    (`meta["note"]` says why). meta: the content of OUT.json.
     """
 
     radiance: Array
     direct: Array
     indirect: Array
+    emission: Array
     hit: Bools
     standard_error: Array | None
     meta: Mapping[str, Any]
@@ -159,7 +161,7 @@ def _trace_paths(
     paths: PathTracer, size: tuple[int, int], spp: int, *, seed: int, threads: int | None, progress: Progress | None
 ) -> Reference:
     estimate = paths.estimate(size, spp, seed, threads, progress)
-    radiance = estimate.direct + estimate.indirect
+    radiance = estimate.direct + estimate.indirect + estimate.emission
     error: dict[str, Any] = {"standard_error": None, "noise": None, "note": ONE_SAMPLE}
     if estimate.variance is not None:
         error = estimate_errors(radiance, estimate.variance, estimate.hit)
@@ -167,6 +169,7 @@ def _trace_paths(
         radiance.astype(np.float32),
         estimate.direct.astype(np.float32),
         estimate.indirect.astype(np.float32),
+        estimate.emission.astype(np.float32),
         estimate.hit,
         None if estimate.variance is None else np.sqrt(estimate.variance).astype(np.float32),
         error,
@@ -196,10 +199,12 @@ def _sum_vpls(
     vpls = cast(scene.emitters, tracer, params.count, params.pattern, seed, bounces=bounces) if emits else NONE
     limits = params.limits(scene.geometry.diagonal)
     indirect = sum_radiance(tracer, seen, vpls, limits, threads=threads, progress=progress).reshape(direct.shape)
+    emission = paths.find_emission(size, seen).reshape(direct.shape)
     return Reference(
-        (direct + indirect).astype(np.float32),
+        (direct + indirect + emission).astype(np.float32),
         direct.astype(np.float32),
         indirect.astype(np.float32),
+        emission.astype(np.float32),
         seen.hit.reshape(direct.shape[:2]),
         None,
         {"vpls_alive": len(vpls), "standard_error": None, "noise": None, "note": VPL_ERROR},

@@ -1,7 +1,7 @@
 """Mitsuba 3's path tracer on the CPU, with the scene and the light of docs/conventions.md.
 
-The spotlight is Mitsuba's `spot`, with cos(theta) cone(theta) as the texture that it projects. Not possible: a light
-with a radius, a cone too wide for that texture, and vertex colours that vary over an image texture.
+A light with a cone is Mitsuba's `spot`, with its intensity as the texture that it projects. Not possible: a spotlight
+with a radius, a cone too wide for that texture, two environments, and vertex colours that vary over an image texture.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Our pixel is the radiance at its centre, a path tracer's is the mean over its area. Both agree as long as nothing within
 the pixel jumps. So rays are traced through a lattice over each pixel, its border included, and a pixel is left out for
-all renderers if two neighbours of the lattice differ in surface, albedo or light.
+all renderers if two neighbours of the lattice differ in surface, albedo, or in which lights reach them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from deferred_ir.base.files import write_json, write_whole
 from deferred_ir.base.progress import Progress
 from deferred_ir.output.image import Image
 from deferred_ir.output.metadata import metadata_path, read_metadata
-from deferred_ir.rays.tracer import Tracer
+from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.scene.scene import Scene
 
 FILE, PICTURE = "mask.npy", "mask.png"
@@ -36,7 +36,7 @@ ROWS = 16
 
 @dataclass(frozen=True, eq=False)
 class Mask:
-    """The pixels that count. counts: bool (H, W), top row first: one surface, all lit or all unlit."""
+    """The pixels that count. counts: bool (H, W), top row first: one surface, all lit by the same lights."""
 
     counts: Bools
 
@@ -55,7 +55,7 @@ class Mask:
 class _Lattice:
     """Hits of the rays through a lattice, all (rows, columns, ...): position, geometric and shading normal, albedo.
 
-    material: -1 where a ray hits nothing. lit: whether the spotlight reaches the point.
+    material: -1 where a ray hits nothing. lit: which direct lights reach the point, a number for each set of them.
     """
 
     position: Array
@@ -63,7 +63,7 @@ class _Lattice:
     shading: Array
     albedo: Array
     material: Any
-    lit: Bools
+    lit: Any
 
     def crop(self, rows: slice, columns: slice) -> _Lattice:
         return _Lattice(*(value[rows, columns] for value in vars(self).values()))
@@ -92,15 +92,27 @@ def _trace(scene: Scene, tracer: Tracer, size: tuple[int, int], first: int, last
     hits = tracer.closest(np.broadcast_to(np.asarray(scene.camera.position, float), directions.shape), directions)
     material = np.where(hits.hit, scene.geometry.face_materials[hits.face], -1)
 
-    light = scene.spotlight
-    sources = np.broadcast_to(np.asarray(light.position, float), hits.position.shape)
-    to_light = sources - hits.position
-    to_light /= np.maximum(np.linalg.norm(to_light, axis=1, keepdims=True), 1e-150)
-    lit = hits.hit & (np.einsum("ij,ij->i", to_light, hits.normal) > 0) & (light.radiate(-to_light) > 0)
-    rows = np.flatnonzero(lit)
-    lit[rows] = ~tracer.occluded(tracer.lift(hits.position[rows], hits.normal[rows]), sources[rows])
+    lit = _find_lit(scene, tracer, hits)
     values: tuple[Any, ...] = (hits.position, hits.normal, hits.shading_normal, hits.albedo, material, lit)
     return _Lattice(*(value.reshape(*shape, *value.shape[1:]) for value in values))
+
+
+def _find_lit(scene: Scene, tracer: Tracer, hits: Hits) -> Any:
+    """Return a number for the set of direct lights that reach each hit, uint64 (n,).
+
+    Lights with a radius count by their middles: their penumbrae may be narrower than a pixel. Areas and environments
+    do not count. Each light has a random number, and those of a set are combined (Zobrist 1970): any number of lights.
+    """
+    lit = np.zeros(len(hits.face), np.uint64)
+    names = np.random.default_rng(0).integers(1 << 63, size=len(scene.direct_lights), dtype=np.uint64)
+    for light, name in zip(scene.direct_lights, names, strict=True):
+        if not any(light.emission):
+            continue
+        found = light.sample(hits.position, None, scene.bounds)
+        rows = np.flatnonzero(hits.hit & (np.einsum("ij,ij->i", found.to, hits.normal) > 0) & (found.strength > 0))
+        starts = tracer.lift(hits.position[rows], hits.normal[rows])
+        lit[rows[~tracer.occluded(starts, found.ends[rows])]] ^= name
+    return lit
 
 
 def _find_whole(lattice: _Lattice) -> Bools:

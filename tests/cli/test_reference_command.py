@@ -141,9 +141,9 @@ def test_an_interrupt_ends_with_one_line_and_no_file(tmp_path, capsys, monkeypat
         begun.append(1)
         if len(begun) == 3:
             raise KeyboardInterrupt
-        return np.zeros((len(surfaces.face), 3))
+        return np.zeros((len(surfaces.face), 3)), np.zeros((len(surfaces.face), 3))
 
-    monkeypatch.setattr(PathTracer, "_estimate_indirect", interrupted)
+    monkeypatch.setattr(PathTracer, "_follow_bounces", interrupted)
     monkeypatch.setattr("deferred_ir.truth.path_tracer.RAYS", 256)
     assert main(["reference", "cornell", "-o", str(tmp_path / "o.npy"), "--size", "64x64", "--spp", "64"]) == 130
     assert capsys.readouterr().err == "deferred-ir: interrupted\n"

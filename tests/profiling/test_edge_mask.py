@@ -8,6 +8,10 @@ import pytest
 from small_scenes import box, build, plane, quad, sphere, textured
 
 from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.directional import Directional
+from deferred_ir.scene.lights.environment import Environment
+from deferred_ir.scene.lights.point import Point
+from deferred_ir.scene.lights.rect import Rect
 from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.truth.metrics import masked_relmse, relmse
 
@@ -105,6 +109,17 @@ def test_the_border_of_a_shadow_is_an_edge():
     middle = (points + np.asarray(light.position)) / 2
     shadow = ((middle[..., ::2] > -0.2) & (middle[..., ::2] < 0.15)).all(axis=-1)
     assert_borders(kept(build(plane(9), card, camera=DOWN, spotlight=light)), shadow)
+
+
+def test_the_shadow_of_each_light_has_a_border_and_that_of_an_area_has_none():
+    card = quad((-0.2, 3, 0.15), (0.15, 3, 0.15), (0.15, 3, -0.2))
+    scene = build(plane(9), card, camera=DOWN)
+    lights = Point((0.4, 6.0, 0.1)), Directional((-0.1, 1.0, 0.1), (0.0, 0.0, 0.0)), ABOVE
+    alone = [kept(replace(scene, lights=(light,))) for light in lights]
+    assert all(0 < (~mask).sum() < 0.2 * mask.size for mask in alone)
+    np.testing.assert_array_equal(kept(replace(scene, lights=lights)), np.all(alone, axis=0))
+    soft = Rect((0.4, 6.0, 0.1), (0.0, 0.0, 0.0), (1.0, 1.0)), Environment(radiance=(1.0, 1.0, 1.0))
+    assert kept(replace(scene, lights=soft)).all()
 
 
 def test_facets_of_a_smooth_surface_are_no_edges_but_its_outline_is():

@@ -19,6 +19,7 @@ from small_scenes import room
 from deferred_ir.base.errors import SettingError
 from deferred_ir.cli.main import main
 from deferred_ir.report.origin import Origin
+from deferred_ir.scene.lights.environment import Environment
 from deferred_ir.truth.reference_noise import ReferenceNoise
 
 ladder = import_module("deferred_ir.profiling.peers.ladder")
@@ -470,13 +471,15 @@ def test_ctrl_c_ends_a_peer_that_renders(process, capfd):
 
 
 def test_mitsuba_refuses_a_scene_that_it_cannot_render():
-    mitsuba_scene = import_module("deferred_ir.profiling.peers.mitsuba_scene")
-    light = room().spotlight
+    mitsuba_lights = import_module("deferred_ir.profiling.peers.mitsuba_lights")
+    scene, light = room(), room().spotlight
     with pytest.raises(SettingError, match="no radius"):
-        mitsuba_scene._spot(None, replace(light, radius=0.1))
+        mitsuba_lights.convert_lights(None, replace(scene, lights=(replace(light, radius=0.1),)))
+    with pytest.raises(SettingError, match="one environment"):
+        mitsuba_lights.convert_lights(None, replace(scene, lights=(Environment(radiance=(1.0, 1.0, 1.0)),) * 2))
     with pytest.raises(SettingError, match=r"179\.9 degrees is too wide"):
-        mitsuba_scene._profile(replace(light, fov=179.9))
+        mitsuba_lights._profile(replace(light, fov=179.9))
     for fov in (1.0, 80.0, 170.0):
-        profile = mitsuba_scene._profile(replace(light, fov=fov))
+        profile = mitsuba_lights._profile(replace(light, fov=fov))
         assert profile.max() == pytest.approx(1, abs=2e-3)
         assert profile[len(profile) // 2, 0] < 0.1 * profile.max()

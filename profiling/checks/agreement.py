@@ -1,6 +1,6 @@
 """Compare the two references, VPLs with ray-cast visibility and the path tracer: do they agree within their noise?
 
-    python -m deferred_ir.profiling.studies.agreement cornell colors --size 128x128
+    python -m deferred_ir.profiling.checks.agreement cornell colors --size 128x128
 
 Both use the same clamp and cone; the VPLs are 16 scrambles of 1024 Sobol points. Blocks of 8x8 pixels agree if their
 means differ by no more than three standard errors (of both) in each channel.
@@ -30,7 +30,7 @@ SCRAMBLES, COUNT, SPP = 16, 1024, 256
 HEAD = "scene", "blocks within 3 standard errors", "lit blocks", "indirect light, VPLs / paths"
 
 
-def blocks(image: np.ndarray) -> np.ndarray:
+def average_blocks(image: np.ndarray) -> np.ndarray:
     """Return the means of blocks of BLOCK x BLOCK pixels, (H / BLOCK, W / BLOCK, 3)."""
     height, width, channels = image.shape
     means: np.ndarray = image.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, channels).mean(axis=(1, 3))
@@ -47,9 +47,9 @@ def measure(scene: Scene, size: tuple[int, int], clamp: float, fov: float) -> di
     limits, sums = VplLimits.from_angle(fov, clamp * scene.geometry.diagonal), []
     for seed in track(range(SCRAMBLES), scene.name):
         vpls = cast(scene.emitters, tracer, COUNT, "sobol", seed)
-        sums.append(blocks(sum_radiance(tracer, seen, vpls, limits).reshape(traced.indirect.shape)))
-    ours, paths = np.array(sums), blocks(traced.indirect)
-    variance = ours.var(axis=0, ddof=1) / SCRAMBLES + blocks(traced.variance) / BLOCK**2
+        sums.append(average_blocks(sum_radiance(tracer, seen, vpls, limits).reshape(traced.indirect.shape)))
+    ours, paths = np.array(sums), average_blocks(traced.indirect)
+    variance = ours.var(axis=0, ddof=1) / SCRAMBLES + average_blocks(traced.variance) / BLOCK**2
     lit = (paths > 0).all(axis=-1)
     off = np.abs(ours.mean(axis=0) - paths)[lit] / np.sqrt(variance[lit])
     return {

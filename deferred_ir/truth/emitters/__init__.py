@@ -1,0 +1,1 @@
+"""What shines, as the path tracer samples it, one kind a file."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Ints
 from deferred_ir.frame.direct_lights import LIGHTS_PER_BLOCK
-from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.frame import Frame, describe_environment
 from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
@@ -37,7 +37,7 @@ class Params(ShadowFilter):
 
 
 class Forward(Pass):
-    """Reflected radiance, one draw of the scene for each direct light and one for every `lights_per_draw` VPLs."""
+    """A draw of the scene for what emits, for each view of a direct light, for every `lights_per_draw` VPLs."""
 
     Params = Params
     inputs: ClassVar[Mapping[str, Input]] = {
@@ -45,6 +45,7 @@ class Forward(Pass):
         "vpls": Input("the VPLs", format="vpl"),
         "primitives": Input("face that shows, plus one", format="r32ui"),
         "depth": Input("depth of that face", format="depth32f", attach=True),
+        "environment": Input("what shows behind everything", format="rgba32f", optional=True),
         "views": Input("how the direct lights' maps were drawn", format="view", optional=True),
         "light_maps": Input("the direct lights' maps", format="depth32f", optional=True),
         "blockers": Input("the same maps: what hides a part of a light's disc", format="depth32f", optional=True),
@@ -54,7 +55,7 @@ class Forward(Pass):
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Radiance in 32 bits: a half float would lose the smaller of 256 terms."""
         del inputs
-        return {"radiance": Output("reflected radiance, linear RGB; 0 on the background", Texture("rgba32f"))}
+        return {"radiance": Output("radiance, linear RGB; alpha 0 on the background", Texture("rgba32f"))}
 
     def depends(self) -> frozenset[str]:
         """The camera and the models; the lights come as inputs."""
@@ -75,8 +76,20 @@ class Forward(Pass):
             **frame.buffers.defines,
         }
         compare = io.gpu.sampler(linear=True, compare=">=")
+        self._draw_emission(frame, io, defines)
         self._draw_lights(frame, io, defines, compare)
         self._draw_vpls(frame, io, defines, compare)
+
+    def _draw_emission(self, frame: Frame, io: Io, defines: Mapping[str, Define]) -> None:
+        """Draw what shines itself: surfaces, and what is behind them."""
+        if frame.scene.surface_light is not None:
+            frame.buffers.draw(io.program("forward_emission.frag", "scene.vert", defines=defines))
+        if io["environment"]:
+            program = io.program("background.frag")
+            program.set(**describe_environment(frame.scene))
+            io.gpu.ctx.disable(io.gpu.ctx.DEPTH_TEST)
+            program.draw_fullscreen()
+            io.gpu.ctx.enable(io.gpu.ctx.DEPTH_TEST)
 
     def _draw_lights(self, frame: Frame, io: Io, defines: Mapping[str, Define], compare: Any) -> None:
         lights, views, described = io["lights"], io["views"], frame.light_views

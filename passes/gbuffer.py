@@ -1,4 +1,5 @@
-"""Draw the scene once into the textures that lighting reads: -> normals, albedo, depth (20 bytes a pixel).
+"""Draw the scene once into the textures that lighting reads: -> normals, albedo, depth (20 bytes a pixel);
+emission (16 more) where a surface has any.
 
 Positions come back from the depth: reversed, in 32 bits, it loses nothing that shows.
 """
@@ -7,8 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from deferred_ir.frame.facts import EMISSION
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Output, Texture
 
@@ -17,15 +20,20 @@ class GBuffer(Pass):
     """Depth, normals and reflectance of the nearest surface in each pixel."""
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
-        """Return up to three textures of the frame's size."""
+        """Return up to four textures of the frame's size."""
         del inputs
         return {
             "normals": Output(
                 "shading and geometric normal, octahedral, towards the viewer", Texture("rgba16"), spare=True
             ),
             "albedo": Output("reflectance, linear RGB; alpha 1 on surfaces", Texture("rgba16f"), spare=True),
+            "emission": Output("radiance that surfaces emit, linear RGB", Texture("rgba32f"), spare=True),
             "depth": Output("reversed depth, near/z; 0 is the background", Texture("depth32f")),
         }
+
+    def unneeded_outputs(self, facts: Facts) -> Mapping[str, str]:
+        """Leave out emission where no surface has any."""
+        return {} if facts[EMISSION] else {"emission": "no surface emits"}
 
     def depends(self) -> frozenset[str]:
         """The camera and the models."""

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir.frame.frame import Frame
+from deferred_ir.frame.frame import Frame, describe_environment
 from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.screen_tiles import TILES, count_pairs
@@ -35,7 +35,7 @@ LIGHTS_SKIPPED = Figure(
 
 
 class Lighting(Pass):
-    """Reflected radiance rho/pi * sum of I(w) cos V / d^2, linear RGB."""
+    """Reflected radiance rho/pi * sum of I(w) cos V / d^2, linear RGB, and what surfaces and the background emit."""
 
     figures = (LIGHTS_SKIPPED,)
     Params = ShadowFilter
@@ -45,6 +45,8 @@ class Lighting(Pass):
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
         "albedo": Input("reflectance", format="rgba16f"),
+        "emission": Input("what surfaces emit", format="rgba32f", optional=True),
+        "environment": Input("what shows behind everything", format="rgba32f", optional=True),
         "tiles": Input("which VPLs may light which tiles of the screen", format="rg32ui", optional=True),
         "direct": Input("light of the direct lights, instead of their maps", optional=True),
         "near_field": Input("irradiance that clamped VPLs miss", format="rgba32f", optional=True),
@@ -62,7 +64,9 @@ class Lighting(Pass):
         del inputs
         return {
             "radiance": Output(
-                "reflected radiance, linear RGB; 0 on the background", Texture("rgba32f"), transient=True
+                "radiance, linear RGB; on the background the environment's, with alpha 0",
+                Texture("rgba32f"),
+                transient=True,
             )
         }
 
@@ -83,6 +87,8 @@ class Lighting(Pass):
             vpls = vpls[:0]
             if io["blend"]:
                 program.set(offset=read_layout(io).offset)
+        if io["environment"]:
+            program.set(**describe_environment(frame.scene))
         draws = _Draws(io, program)
         if not culled:
             lit = vpls[find_shining(vpls)]

@@ -9,6 +9,10 @@ layout(location = TARGET_NORMALS) out vec4 normals;
 layout(location = TARGET_ALBEDO) out vec4 albedo;
 #endif
 
+#ifdef TARGET_EMISSION
+layout(location = TARGET_EMISSION) out vec4 emission;
+#endif
+
 void main() {
     Surface s = surface();
 #ifdef TARGET_NORMALS
@@ -16,6 +20,9 @@ void main() {
 #endif
 #ifdef TARGET_ALBEDO
     albedo = vec4(min(s.albedo, 65504.0), 1.0);  // half floats end there; infinity times a light of 0 is no number
+#endif
+#ifdef TARGET_EMISSION
+    emission = vec4(emitted(), 1.0);
 #endif
     WRITE_DEPTH(frame.near);
 }

@@ -21,6 +21,13 @@ uniform int block;  // number of the bound block of VPLs
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 layout(binding = UNIT_ALBEDO) uniform sampler2D albedo;
+#if HAS_EMISSION
+layout(binding = UNIT_EMISSION) uniform sampler2D emission;
+#endif
+#if HAS_ENVIRONMENT
+#include "lib/lights/environment.glsl"
+layout(binding = UNIT_ENVIRONMENT) uniform sampler2D environment;
+#endif
 #if HAS_DIRECT
 layout(binding = UNIT_DIRECT) uniform sampler2D direct;
 #endif
@@ -71,6 +78,10 @@ void main() {
     float d = texelFetch(depth, pixel, 0).r;
     if (d <= 0.0) {  // background
         radiance = vec4(0.0);
+#if HAS_ENVIRONMENT
+        vec3 ray = frame.ray[0].xyz * ndc.x + frame.ray[1].xyz * ndc.y + frame.ray[2].xyz;
+        if (first) radiance.rgb = environment_radiance(environment, ray);
+#endif
         return;
     }
     Pixel p = read_pixel(normals, pixel, ndc, d);
@@ -110,4 +121,7 @@ void main() {
 #endif
 #endif
     radiance = vec4(texelFetch(albedo, pixel, 0).rgb * irradiance * INVERSE_PI, 1.0);
+#if HAS_EMISSION
+    if (first) radiance.rgb += texelFetch(emission, pixel, 0).rgb;
+#endif
 }

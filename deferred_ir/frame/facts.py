@@ -16,8 +16,11 @@ VIEWS = Fact[Sequence[int]](
     "views", unknown=(0,), doc="Of each shadow map of direct lights, how often its edge is halved."
 )
 SAMPLED = Fact("sampled", unknown=True, doc="Lights shine for which points stand.")
-ENVIRONMENT = Fact(
-    "environment", unknown=True, doc="There is light from all around, to see behind everything.", needs=True
+ENVIRONMENT = Fact[tuple[int, int] | None](
+    "environment",
+    unknown=(1, 1),
+    doc="Size of the image of light from all around; None without.",
+    needs=True,
 )
 EMISSION = Fact("emission", unknown=True, doc="Surfaces emit.", needs=True)
 SOFTWARE = Fact("software", unknown=True, doc="OpenGL draws on the CPU.")
@@ -33,7 +36,7 @@ def collect_facts(scene: Scene, size: tuple[int, int] | None = None, *, software
             DIRECT_LIGHTS: len(direct),
             VIEWS: tuple(view.halvings for light in direct for view in light.list_views(scene.bounds)),
             SAMPLED: bool(scene.sampled_lights),
-            ENVIRONMENT: scene.environment is not None,
+            ENVIRONMENT: scene.environment.size if scene.environment else None,
             EMISSION: scene.surface_light is not None,
             TRIANGLES: len(scene.geometry.faces),
         }

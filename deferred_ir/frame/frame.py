@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -117,6 +118,14 @@ class Frame:
         # Axes are orthogonal, so dividing by the squared length inverts them; forward has length 1.
         record["clip"][:, :3] = rays / (rays**2).sum(axis=1, keepdims=True)
         return record.tobytes()
+
+
+def describe_environment(scene: Scene) -> dict[str, Any]:
+    """Return the uniforms of shaders/lib/lights/environment.glsl."""
+    light = scene.environment
+    angle = math.radians(light.rotation) if light else 0.0
+    emission = light.emission if light else (0.0, 0.0, 0.0)
+    return {"environment_emission": emission, "environment_turn": (math.cos(angle), math.sin(angle))}
 
 
 PARTS: Mapping[str, Callable[[Frame], Any]] = {

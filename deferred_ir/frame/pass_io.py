@@ -20,7 +20,7 @@ NO_DEFINES: Mapping[str, Define] = {}
 Resource = GpuTexture | GpuBuffer | list[GpuTexture]
 Meta = TypeVar("Meta")
 Rectangle = tuple[int, int, int, int]
-SCENE_SAMPLERS = {"albedo_texture"}
+SCENE_SAMPLERS = {"albedo_texture", "emission_texture"}
 """Samplers that SceneBuffers binds; all others must be ports."""
 
 

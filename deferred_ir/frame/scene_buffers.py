@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -21,10 +22,10 @@ from deferred_ir.meshes.posed import MapMesh, PosedMesh
 from deferred_ir.scene.geometry import Geometry
 from deferred_ir.scene.scene import Scene
 
-FACES, MATERIALS = 0, 1
+FACES, MATERIALS, EMISSIONS = 0, 1, 2
 """Bindings of the storage buffers that lib/surface/surface.glsl declares."""
-ALBEDO_TEXTURE = 15
-"""Texture unit of `albedo_texture`; inputs of passes count up from 0, and GL promises 16 units."""
+ALBEDO_TEXTURE, EMISSION_TEXTURE = 15, 14
+"""Texture units of `albedo_texture` and `emission_texture`; inputs of passes count up from 0, and GL promises 16."""
 OWN = "own"
 """Key of the scene's own clusters, among those of stand-in meshes."""
 
@@ -48,14 +49,15 @@ class SceneBuffers:
             # interpolated 1 is not quite 1.
             neutral = {"normal": np.zeros((count, 3)), "uv": np.zeros((count, 2))}
             arrays |= {name: array for name, array in neutral.items() if arrays[name] is None}
-        self._ranges = _find_ranges(scene)
+        self._runs = _find_runs(scene)
         self.has_normals = arrays["normal"] is not None
         self.defines = {
             "HAS_NORMALS": int(self.has_normals),
             "HAS_UVS": int(arrays["uv"] is not None),
             "HAS_COLORS": int(arrays["color"] is not None),
             "ONE_MATERIAL": int(len(scene.materials) == 1 and not general),
-            "ALL_TEXTURED": int(all(texture is not None for texture, _, _ in self._ranges) and not general),
+            "ALL_TEXTURED": int(all(run.texture is not None for run in self._runs) and not general),
+            "EMITS": int(scene.surface_light is not None),
         }
         ctx = gpu.ctx
         self._attributes = {
@@ -71,6 +73,11 @@ class SceneBuffers:
         self._textures = [self._upload(texture) for texture in scene.textures]
         self.face_count = len(g.faces)
         buffers = [*(buffer for buffer, _ in self._attributes.values()), self._indices, self._faces, self._materials]
+        self._emissions = None
+        if scene.surface_light is not None:
+            emissions = [(*material.emission, material.emits_both_sides) for material in scene.materials]
+            self._emissions = ctx.buffer(np.array(emissions, "f4").tobytes())
+            buffers.append(self._emissions)
         self._buffers = buffers
         self._clustered: dict[Hashable, ClusterBuffers] = {}
         self.texture_bytes = sum(texture.nbytes for texture in self._textures)
@@ -155,6 +162,8 @@ class SceneBuffers:
         """Bind faces and materials for shaders."""
         self._faces.bind_to_storage_buffer(FACES)
         self._materials.bind_to_storage_buffer(MATERIALS)
+        if self._emissions:
+            self._emissions.bind_to_storage_buffer(EMISSIONS)
 
     def draw(self, program: Program, instances: int = 1) -> None:
         """Draw all triangles in one call, or in one for each texture if the program samples textures."""
@@ -163,16 +172,21 @@ class SceneBuffers:
             attributes = [(*self._attributes[name], name) for name in program.attributes]
             array = self.gpu.ctx.vertex_array(program.glsl, attributes, self._indices, index_element_size=4)
             program.arrays[self] = array
-        if "albedo_texture" not in program.samplers:
+        if not program.samplers & {"albedo_texture", "emission_texture"}:
             if program.has("first_face"):
                 program.set(first_face=0)
             array.render(self.gpu.ctx.TRIANGLES, instances=instances)
             return
-        for texture, first, count in self._ranges:
-            if texture is not None:
-                self._textures[texture].bind(ALBEDO_TEXTURE, self.gpu.sampler(linear=True, repeat=True))
-            program.set(textured=texture is not None, first_face=first)
-            array.render(self.gpu.ctx.TRIANGLES, vertices=3 * count, first=3 * first, instances=instances)
+        for run in self._runs:
+            if run.texture is not None:
+                self._textures[run.texture].bind(ALBEDO_TEXTURE, self.gpu.sampler(linear=True, repeat=True))
+            if "emission_texture" in program.samplers:
+                if run.emission is not None:
+                    self._textures[run.emission].bind(EMISSION_TEXTURE, self.gpu.sampler(linear=True, repeat=True))
+                program.set(emission_textured=run.emission is not None)
+            program.set(textured=run.texture is not None, first_face=run.first)
+            vertices, first = 3 * run.count, 3 * run.first
+            array.render(self.gpu.ctx.TRIANGLES, vertices=vertices, first=first, instances=instances)
 
     def release(self) -> None:
         """Delete all buffers and textures. Vertex arrays that programs hold for this scene must go first."""
@@ -195,13 +209,23 @@ def _group_runs(numbers: Ints) -> list[slice]:
     return [slice(int(part[0]), int(part[-1]) + 1) for part in parts if len(part)]
 
 
-def _find_ranges(scene: Scene) -> list[tuple[int | None, int, int]]:
-    """Return (texture, first face, count) of each run of faces with one texture; loading sorts faces by texture."""
-    textures = np.array([-1 if m.texture is None else m.texture for m in scene.materials])
-    of_face = textures[scene.geometry.face_materials]
+@dataclass(frozen=True)
+class _Run:
+    """Faces first, first + 1, ... with one texture of reflectance and one of emission, if any."""
+
+    texture: int | None
+    emission: int | None
+    first: int
+    count: int
+
+
+def _find_runs(scene: Scene) -> list[_Run]:
+    """Return the runs of faces with the same textures; loading sorts faces by these."""
+    textures = [(m.texture, m.emission_texture) for m in scene.materials]
+    kinds = {pair: number for number, pair in enumerate(dict.fromkeys(textures))}
+    of_face = np.array([kinds[pair] for pair in textures])[scene.geometry.face_materials]
     starts = np.flatnonzero(np.diff(of_face, prepend=of_face[0] - 1))
     ends = np.append(starts[1:], len(of_face))
-    return [
-        (None if of_face[start] < 0 else int(of_face[start]), int(start), int(end - start))
-        for start, end in zip(starts, ends, strict=True)
-    ]
+    pairs = list(kinds)
+    found = [(*pairs[of_face[start]], int(start), int(end - start)) for start, end in zip(starts, ends, strict=True)]
+    return [_Run(texture, emission, first, count) for texture, emission, first, count in found]

@@ -60,6 +60,14 @@ class Environment(CheckedLight):
         """It lies all around."""
         return True
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of its image; one pixel where it is constant."""
+        if self.image is None:
+            return 1, 1
+        height, width = self.image.pixels.shape[:2]
+        return width, height
+
     def look_up(self, directions: Array) -> Array:
         """Return its radiance in unit `directions` (n, 3), float64 (n, 3)."""
         values = np.ones((len(directions), 3)) if self.image is None else self.image.look_up(self._turn(directions, -1))

@@ -6,6 +6,10 @@ layout(std430, binding = 0) readonly buffer Faces { vec4 faces[]; };          //
 layout(std430, binding = 1) readonly buffer Materials { vec4 materials[]; };  // albedo, linear RGB
 uniform int first_face;  // of this draw call: gl_PrimitiveID starts at 0 in each
 
+#if EMITS
+layout(std430, binding = 2) readonly buffer Emissions { vec4 emissions[]; };  // linear RGB, 1: from both sides
+#endif
+
 in vec3 world_position;
 #if HAS_NORMALS
 in vec3 world_normal;
@@ -18,6 +22,10 @@ in vec2 texture_uv;
 layout(binding = 15) uniform sampler2D albedo_texture;
 #if !ALL_TEXTURED
 uniform bool textured;
+#endif
+#if EMITS
+layout(binding = 14) uniform sampler2D emission_texture;
+uniform bool emission_textured;
 #endif
 #endif
 
@@ -60,4 +68,18 @@ Surface surface() {
         s.albedo *= texture(albedo_texture, texture_uv).rgb;
 #endif
     return s;
+}
+
+// What the surface emits to the camera, as radiance.
+vec3 emitted() {
+#if EMITS
+    vec4 face = faces[face_number()], emission = emissions[int(face.w)];
+    if (emission.w == 0.0 && dot(face.xyz, frame.camera - world_position) < 0.0) return vec3(0.0);
+#if HAS_UVS
+    if (emission_textured) emission.rgb *= texture(emission_texture, texture_uv).rgb;
+#endif
+    return emission.rgb;
+#else
+    return vec3(0.0);
+#endif
 }

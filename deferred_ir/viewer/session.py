@@ -219,19 +219,19 @@ class Session:
 
     def draw(self) -> bool:
         """Bring the picture up to date. Returns whether it changed."""
-        if self.playing:
-            self.time += 1 / FRAMES_PER_SECOND
-            self._place()
-            self.lights.follow(self.time)
-        if self._recorder:
-            self._recorder.add(clock.monotonic(), self.camera, self.lights.entries)
         try:
+            if self.playing:
+                self.time += 1 / FRAMES_PER_SECOND
+                self._place()
+                self.lights.follow(self.time)
+            if self._recorder:
+                self._recorder.add(clock.monotonic(), self.camera, self.lights.entries)
             changed = self._update()
         except Error as error:
             self.error = str(error)
             self._undo()
             self._undo, self.drawn, self.accumulation = lambda: None, None, None
-            self._still = False
+            self._still = self.playing = False
             return False
         self.version += changed
         return changed

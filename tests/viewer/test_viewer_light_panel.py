@@ -14,6 +14,7 @@ from deferred_ir.loading.load import load
 from deferred_ir.scene.lights.kinds import find_kinds
 from deferred_ir.scene.lights.point import Point
 from deferred_ir.scene.lights.spot import Spot
+from deferred_ir.scene.motion import KeyframedLight
 from deferred_ir.viewer.panels import side_panel as panels
 from deferred_ir.viewer.panels.light_outlines import ON, SELECTED, find_outlines
 from deferred_ir.viewer.panels.lines import find_hidden, project
@@ -205,3 +206,15 @@ def test_an_image_of_the_sky_is_saved_with_its_place(viewer, tmp_path, monkeypat
     frames(viewer, 2)
     act(viewer, "key", "ctrl+s")
     assert load(tmp_path / "there" / "cornell-1.toml").lights[1] == viewer.session.light
+
+
+def test_a_motion_that_cannot_be_followed_stops_and_tells(viewer):
+    at, look_at = (0.3, 0.5, 0.0), (0.3, 0.0, 0.0)
+    path = KeyframedLight((0.0, 0.1), (at, at), (look_at, at))
+    viewer.session.use(replace(cornell(), lights=(Spot(at, look_at, motion=path),)))
+    viewer.frame()
+    viewer.session.playing = True
+    frames(viewer, 6)
+    assert not viewer.session.playing
+    assert "look_at" in viewer.session.error
+    assert viewer.session.light.position == at

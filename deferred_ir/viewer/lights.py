@@ -22,7 +22,7 @@ from deferred_ir.scene.lights.fields import COLOURS
 
 EXTENT = 0.1
 """Size of a new light with an area, over its distance from the camera."""
-RAISED = 0.15
+RAISED = 0.1
 """How much higher than the line of sight a new light is, over the same distance: its lines are seen from the side."""
 SAMPLES = 64
 """Points of a light that say how bright it is."""

@@ -11,7 +11,7 @@ from deferred_ir.viewer.session import Session
 
 LENGTH = 0.02
 """Length of a VPL's axes in diagonals of the scene."""
-COLORS = np.array([(1.0, 0.25, 0.2), (0.3, 0.9, 0.3), (0.3, 0.5, 1.0)])
+COLORS = (1.0, 0.25, 0.2), (0.3, 0.9, 0.3), (0.3, 0.5, 1.0)
 WIDTH = 1.5
 """Of lines, pixels."""
 
@@ -46,5 +46,5 @@ def draw_axes(overlay: Overlay) -> None:
     tips = origin[:, None] + axes * LENGTH * session.scene.geometry.diagonal
     lines = np.stack([np.broadcast_to(origin[:, None], tips.shape), tips], axis=2) + centre
     hidden = find_hidden(session.renderer.tracer().lift(origin, axes[:, 2]) + centre, session)
-    colors = np.tile(COLORS, (len(origin), 1))
-    overlay.draw(lines.reshape(-1, 2, 3), colors, np.repeat(hidden, 3), WIDTH)
+    for axis, color in enumerate(COLORS):
+        overlay.draw(lines[:, axis], color, hidden, WIDTH)

@@ -11,6 +11,8 @@ from deferred_ir.base.arrays import Array, Bools
 from deferred_ir.viewer.canvas import Area
 from deferred_ir.viewer.session import Session
 
+Color = tuple[float, float, float]
+"""Red, green and blue of the display."""
 DIM = 0.25
 """Opacity of a line behind a surface."""
 
@@ -47,8 +49,8 @@ class Overlay:
     window_height: int
     covered: int = 0
 
-    def draw(self, lines: Array, colors: Array, hidden: Bools, width: float) -> None:
-        """Draw lines (n, 2, 3) that lie before the eye. colors: (n, 3); hidden: which are dim, (n,); width: pixels."""
+    def draw(self, lines: Array, color: Color, hidden: Bools, width: float) -> None:
+        """Draw lines (n, 2, 3) that lie before the eye. hidden: which are dim, (n,); width: pixels."""
         imgui, area = self.imgui, self.area
         ends, front = project(lines.reshape(-1, 3), self.session)
         ends, front = ends.reshape(-1, 2, 2), front.reshape(-1, 2)
@@ -56,8 +58,9 @@ class Overlay:
         shift = np.array([area.x, self.window_height - area.y - area.height])
         drawing = imgui.get_background_draw_list()
         drawing.push_clip_rect(imgui.ImVec2(*shift), imgui.ImVec2(shift[0] + area.width, shift[1] + area.height))
-        for i in np.flatnonzero(front.all(axis=1) & free):
-            packed = imgui.get_color_u32(imgui.ImVec4(*colors[i], DIM if hidden[i] else 1.0))
-            start, end = ends[i] + shift
-            drawing.add_line(imgui.ImVec2(*start), imgui.ImVec2(*end), packed, width)
+        drawn = front.all(axis=1) & free
+        bright, dim = (imgui.get_color_u32(imgui.ImVec4(*color, opacity)) for opacity in (1.0, DIM))
+        # Plain numbers: there may be ten thousand lines, and arrays of two would cost more than drawing them.
+        for (start, end), is_dim in zip((ends[drawn] + shift).tolist(), hidden[drawn].tolist(), strict=True):
+            drawing.add_line(start, end, dim if is_dim else bright, width)
         drawing.pop_clip_rect()

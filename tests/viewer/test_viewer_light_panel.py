@@ -218,3 +218,27 @@ def test_a_motion_that_cannot_be_followed_stops_and_tells(viewer):
     assert not viewer.session.playing
     assert "look_at" in viewer.session.error
     assert viewer.session.light.position == at
+
+
+def test_every_map_of_a_light_can_be_shown_whichever_pass_draws_it(viewer):
+    """A point has six; the atlas and maps of their own hold the same depths."""
+    session, maps = viewer.session, {}
+    session.lights.add(BLUE)
+    for graph in ("forward", "deferred"):
+        session.change(graph, FEW)
+        viewer.frame()
+        with viewer.window:
+            maps[graph] = [read(one) for one in viewer.panel.maps._find_maps() if not one.light.startswith("vpl")]
+    assert len(maps["deferred"]) == 7
+    assert sum(depth.any() for depth in maps["forward"]) >= 6, "only the way out of the box is empty"
+    for own, tile in zip(maps["forward"], maps["deferred"], strict=True):
+        np.testing.assert_allclose(tile, own, atol=1e-6)
+
+
+def read(one):
+    """The depths of a map, top row last."""
+    depth = one.texture.read()
+    if one.area is None:
+        return depth[..., 0]
+    x, y, width, height = one.area.x, one.area.y, one.area.width, one.area.height
+    return depth[one.layer, y : y + height, x : x + width, 0]

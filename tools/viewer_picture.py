@@ -17,10 +17,11 @@ WINDOW = 1280, 720
 
 
 def main(target: str, scale: str = "1") -> int:
-    """Draw the Cornell box with axes of its lights and the shadow map, by the keys that a user would press."""
+    """Draw the Cornell box with a second light, outlines, axes and a shadow map, as a user would by mouse and keys."""
     from deferred_ir.gl.window import Window
     from deferred_ir.loading.load import load
     from deferred_ir.output.image import Image
+    from deferred_ir.scene.lights.point import Point
     from deferred_ir.viewer.app import Viewer
     from deferred_ir.viewer.session import Session
 
@@ -36,7 +37,8 @@ def main(target: str, scale: str = "1") -> int:
             for x in range(440, 350, -10):
                 act(viewer, "mousemove", x, 10, frames=2)
             act(viewer, "mouseup", 3)
-            for key in ("f", "m"):
+            viewer.session.lights.add(Point((0.45, 0.3, 0.05), (0.2, 0.12, 0.03)))
+            for key in ("g", "f", "m"):
                 act(viewer, "key", key)
             Image(None, viewer.screenshot()).save(target)
         finally:

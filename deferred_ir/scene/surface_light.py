@@ -103,6 +103,11 @@ class SurfaceLight:
         del by
         return self
 
+    def outline(self, bounds: Bounds) -> Array:
+        """Return no lines: its surfaces are seen."""
+        del bounds
+        return np.zeros((0, 2, 3))
+
 
 def find_surface_light(
     geometry: Geometry, materials: tuple[Material, ...], textures: tuple[Texture, ...]

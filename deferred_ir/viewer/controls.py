@@ -11,7 +11,8 @@ import numpy as np
 from deferred_ir.gl.window import Window
 from deferred_ir.loading.load import builtin_scenes
 from deferred_ir.scene.camera import Camera
-from deferred_ir.viewer.navigation import as_camera, as_light, move, turn
+from deferred_ir.viewer.lights import make_light
+from deferred_ir.viewer.navigation import as_light, looks, move, turn, turn_light
 from deferred_ir.viewer.session import Session
 
 FIRST = "cornell"
@@ -25,6 +26,8 @@ TURN = 0.005
 """Radians a pixel of the mouse's way."""
 NOTCH = SPEED / 4
 """Diagonals of the scene a notch of the wheel."""
+BESIDE = 0.05, 0.0, 0.0
+"""Where a copy of a light appears: to the right, in diagonals of the scene."""
 
 Step = tuple[float, float, float]
 
@@ -36,7 +39,7 @@ class Controls:
         from imgui_bundle import imgui
 
         self._imgui, self._window, self._session = imgui, window, session
-        self.switches = {"frames": False, "map": False, "panel": True}
+        self.switches = {"frames": False, "outlines": False, "map": False, "panel": True}
         self.saving = False
 
     def take(self) -> None:
@@ -68,13 +71,35 @@ class Controls:
         self._session.progressive = not self._session.progressive
 
     def swap_view(self) -> None:
-        """See from the light, or from the camera again."""
-        self._session.from_light = not self._session.from_light
+        """See from the light if it looks anywhere, or from the camera again."""
+        self._session.from_light = looks(self._session.light) and not self._session.from_light
         self._session.invalidate()
+
+    def select_next(self) -> None:
+        """Select the next light."""
+        self._session.lights.select_next()
+
+    def switch_light(self) -> None:
+        """Switch the selected light off, or on again."""
+        lights = self._session.lights
+        if lights.entries:
+            lights.switch(lights.selected)
 
     def move_light_to_camera(self) -> None:
         """Put the light where the camera is, and let it look the same way."""
-        self._session.shine(as_light(self._session.spotlight, self._session.camera))
+        self._session.lights.edit(lambda light: as_light(light, self._session.camera))
+
+    def add_light(self, kind: Any) -> None:
+        """Add a light of a kind in front of the camera, and show where the lights are."""
+        session = self._session
+        way = self._measure_way()
+        session.lights.add(make_light(kind, session.camera, way, session.lights.shining, session.scene.bounds))
+        self.switches["outlines"] = True
+
+    def duplicate_light(self) -> None:
+        """Add a copy of the selected light beside it."""
+        x, y, z = (np.asarray(self._scale(BESIDE)) @ self._session.camera.axes).tolist()
+        self._session.lights.duplicate((x, y, z))
 
     def fly(self, diagonals: Step) -> None:
         """Move what flies by (right, up, forward) along its own axes."""
@@ -86,27 +111,34 @@ class Controls:
 
     def push_light(self, diagonals: Step) -> None:
         """Move the light by (right, up, forward) along the axes of the camera."""
-        session = self._session
-        by = np.asarray(self._scale(diagonals)) @ session.camera.axes
-        light = as_camera(session.spotlight)
-        right, up, forward = by @ light.axes.T
-        session.shine(as_light(session.spotlight, move(light, (right, up, forward))))
+        x, y, z = (np.asarray(self._scale(diagonals)) @ self._session.camera.axes).tolist()
+        self._session.lights.edit(lambda light: light.translate((x, y, z)))
 
     def drag_light(self, x: float, y: float) -> None:
         """Move the light by a way of the mouse, pixels; with Shift turn it."""
         if self._imgui.get_io().key_shift:
-            light = self._session.spotlight
-            self._session.shine(as_light(light, turn(as_camera(light), x * TURN, -y * TURN)))
+            self._session.lights.edit(lambda light: turn_light(light, x * TURN, -y * TURN))
         else:
             height = max(self._window.size[1], 1)
             self.push_light((x / 2 / height, -y / 2 / height, 0.0))
 
     def _see(self, eye: Camera) -> None:
         """Take `eye` for what flies: the camera, or the light while the picture is seen from it."""
-        if self._session.from_light:
-            self._session.shine(as_light(self._session.spotlight, eye))
+        if self._session.sees_from_light:
+            self._session.lights.edit(lambda light: as_light(light, eye))
         else:
             self._session.look(eye)
+
+    def _measure_way(self) -> float:
+        """Return how far the surface in the middle of the camera's picture is, world units; without one, a guess."""
+        session = self._session
+        camera, geometry = session.camera, session.scene.geometry
+        if session.drawn is None:
+            return geometry.diagonal / 2
+        origin = np.subtract([camera.position], geometry.centre)
+        found = session.renderer.tracer().closest(origin, camera.axes[2:])
+        way = float(np.linalg.norm(found.position[0] - origin[0]))
+        return way if found.hit[0] and way > 0 else geometry.diagonal / 2
 
     def _scale(self, diagonals: Step) -> Step:
         """Convert diagonals of the scene to world units."""
@@ -201,14 +233,21 @@ KEYS: tuple[Press | Hold | Drag | Wheel, ...] = (
     Hold("W A S D, Q E", "fly; down and up", FLY, Controls.fly),
     Wheel("wheel", "fly forward and back", lambda controls, notches: controls.fly((0.0, 0.0, notches * NOTCH))),
     Drag("left mouse button", "look around", "left", Controls.look_around),
-    Hold("arrows, page up/down", "move the light along the camera's axes", PUSH, Controls.push_light),
-    Drag("right mouse button", "move the light; with Shift, turn it", "right", Controls.drag_light),
-    Press("L", "put the light at the camera", lambda controls, _: controls.move_light_to_camera()),
-    Press("V", "see from the light, and fly it", lambda controls, _: controls.swap_view()),
+    Hold("arrows, page up/down", "move the selected light along the camera's axes", PUSH, Controls.push_light),
+    Drag("right mouse button", "move the selected light; with Shift, turn it", "right", Controls.drag_light),
+    Press("L", "put the selected light at the camera", lambda controls, _: controls.move_light_to_camera()),
+    Press("V", "see from the selected light, and fly it", lambda controls, _: controls.swap_view()),
+    Press("N", "select the next light", lambda controls, _: controls.select_next()),
+    Press("O", "switch the selected light off, or on again", lambda controls, _: controls.switch_light()),
     Press(
         "F",
-        "draw light and VPLs as axes: x red, y green, z, where they shine, blue; dim behind surfaces",
+        "draw VPLs as axes: x red, y green, z, where they shine, blue; dim behind surfaces",
         lambda controls, _: controls.toggle("frames"),
+    ),
+    Press(
+        "G",
+        "draw lights as outlines, the selected one white; dim behind surfaces",
+        lambda controls, _: controls.toggle("outlines"),
     ),
     Press("M", "show a shadow map in the lower left corner", lambda controls, _: controls.toggle("map")),
     Press("P", "play the scene's motions", lambda controls, _: controls.play()),

@@ -42,6 +42,7 @@ class ReferenceJob:
         """Trace `scene` in (width, height) pixels with spp paths each, in place of what was traced before."""
         self.stop()
         self._cancel.clear()
+        self._measured = 0.0, None
         self.error, self.progress, self.result, self._view = "", 0.0, None, _identify(scene, size, bounces)
         # A daemon ends with the program, whatever it is doing.
         self._thread = threading.Thread(target=self._trace, args=(scene, size, spp, bounces), daemon=True)

@@ -22,6 +22,7 @@ from deferred_ir.graph.params import specs
 from deferred_ir.loading import scene_file, scene_file_writer
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.base import Light
 from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.scene import RenderDefaults
 from deferred_ir.viewer.session import Session
@@ -76,7 +77,6 @@ def describe_scene(session: Session, stem: str) -> SceneFile:
     """Return the content of the scene file NAME.toml of what is on screen; stem: NAME."""
     scene, path = session.scene, session.scene.path
     entries = scene_file.read(path).models if path.suffix.lower() == ".toml" else (ModelEntry(path),)
-    camera, light = _choose_motions(session)
     builtin = _is_builtin(session.graph)
     render = RenderDefaults(
         graph=session.graph if builtin else f"{stem}{GRAPH}",
@@ -85,18 +85,31 @@ def describe_scene(session: Session, stem: str) -> SceneFile:
         set=session.settings if builtin else {},
     )
     models = tuple(_place_model(entry, session.time) for entry in entries)
-    return SceneFile(scene.name, models, camera, (light,), render)
+    return SceneFile(scene.name, models, _choose_camera(session), describe_lights(session), render)
 
 
-def _choose_motions(session: Session) -> tuple[Camera, Spotlight]:
-    """Return the view and the light on screen, with their motions if they are where those begin."""
-    scene = session.scene
-    start, camera, light = scene.at(0.0), session.eye, session.spotlight
-    if camera == replace(start.camera, motion=None):
-        camera = scene.camera
-    if light == replace(start.spotlight, motion=None):
-        light = scene.spotlight
-    return camera, light
+def _choose_camera(session: Session) -> Camera:
+    """Return the view on screen, with the camera's motion if it is where that begins."""
+    start = replace(session.scene.at(0.0).camera, motion=None)
+    return session.scene.camera if session.eye == start else session.eye
+
+
+def describe_lights(session: Session) -> tuple[Light, ...]:
+    """Return the lights that are on, with their motions if they are where those begin.
+
+    Where all are off and no surface emits, that is a black one: for a file without any light one would be chosen.
+    """
+    lights = tuple(_resolve_image(entry.with_motion) for entry in session.lights.entries if entry.on)
+    if lights or session.shown.emits:
+        return lights
+    return (Spotlight(session.camera.position, session.camera.look_at, emission=(0.0, 0.0, 0.0)),)
+
+
+def _resolve_image(light: Any) -> Light:
+    """Return a light whose image, if it has one, has a name that holds in any folder."""
+    image = getattr(light, "image", None)
+    resolved: Light = replace(light, image=replace(image, name=str(Path(image.name).resolve()))) if image else light
+    return resolved
 
 
 def _place_model(entry: ModelEntry, time: float) -> ModelEntry:

@@ -1,4 +1,4 @@
-"""What the viewer shows: a scene, its camera and light, a graph with settings, and the Renderer that draws them.
+"""What the viewer shows: a scene, its camera and lights, a graph with settings, and the Renderer that draws them.
 
 Knows neither window nor controls. A change costs no more than it must: frames are reused (deferred_ir/engine/reuse.py),
 so a pass is skipped while its inputs are unchanged. Whatever fails leaves the last good picture, and `error`.
@@ -20,14 +20,14 @@ from deferred_ir.engine.settings import DEFAULT_GRAPH, choose_settings
 from deferred_ir.engine.setup import IMAGES
 from deferred_ir.gl.devices import Loader
 from deferred_ir.graph.graph import Plan
-from deferred_ir.graph.roles import find_parameters
 from deferred_ir.loading.load import load
 from deferred_ir.output.image import Image
 from deferred_ir.scene.camera import Camera
-from deferred_ir.scene.lights.spotlight import Spotlight
+from deferred_ir.scene.lights.base import Light
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.scene.scene import Scene
-from deferred_ir.viewer.navigation import as_camera
+from deferred_ir.viewer.lights import LightList
+from deferred_ir.viewer.navigation import as_camera, looks
 from deferred_ir.viewer.plan_changes import find_changed
 from deferred_ir.viewer.recording import Recorder
 
@@ -67,22 +67,22 @@ class Session:
         self._undo: Callable[[], None] = lambda: None
         self._still = False
         self.drawn: Plan | None = None
+        self.lights = LightList(self.invalidate)
         self.use(scene)
         self.plan = self._make_plan(self.shown)
 
-    # The scene, its camera and its light
+    # The scene, its camera and its lights
 
     def use(self, scene: Scene) -> None:
         """Show `scene`, from the start of its motions."""
+        self.lights.use(scene.lights)
         self.scene, self.time = scene, 0.0
-        self._place(scene.at(0.0))
-        self.emission = self.spotlight.emission
+        self._place()
 
-    def _place(self, scene: Scene) -> None:
-        """Take camera, light and models from a scene at one time."""
-        self.geometry = scene.geometry
-        self.camera = replace(scene.camera, motion=None)
-        self.spotlight = replace(scene.spotlight, motion=None)
+    def _place(self) -> None:
+        """Take camera and models from where the scene's motions are."""
+        placed = self.scene.at(self.time)
+        self.geometry, self.camera = placed.geometry, replace(placed.camera, motion=None)
         self.invalidate()
 
     @property
@@ -91,17 +91,27 @@ class Session:
         return self.renderer.size
 
     @property
+    def light(self) -> Any:
+        """The selected light, None without any."""
+        return self.lights.light
+
+    @property
+    def sees_from_light(self) -> bool:
+        """Whether the view on screen is that of the selected light."""
+        return self.from_light and looks(self.light)
+
+    @property
     def eye(self) -> Camera:
         """The view on screen: the camera's, or the light's."""
-        return as_camera(self.spotlight) if self.from_light else self.camera
+        return as_camera(self.light, self.camera.fov) if self.sees_from_light else self.camera
 
     @property
     def shown(self) -> Scene:
         """The scene as it is drawn."""
-        return replace(self.scene, geometry=self.geometry, camera=self.eye, lights=(self.spotlight,))
+        return replace(self.scene, geometry=self.geometry, camera=self.eye, lights=self.lights.shining)
 
     def invalidate(self) -> None:
-        """Ask for a new picture: camera, light, scene or seed have changed."""
+        """Ask for a new picture: camera, lights, scene or seed have changed."""
         self._still = False
 
     def look(self, camera: Camera) -> None:
@@ -109,25 +119,26 @@ class Session:
         self.camera = camera
         self.invalidate()
 
-    def shine(self, light: Spotlight) -> None:
-        """Light the scene by `light`."""
-        self.spotlight = light
-        self.invalidate()
+    def shine(self, light: Light) -> None:
+        """Light the scene by `light`, in place of the selected one."""
+        self.lights.put(light)
 
     @property
     def recording(self) -> bool:
-        """Whether the path of camera and light is being recorded."""
+        """Whether the paths of camera and lights are being recorded."""
         return self._recorder is not None
 
     def switch_recording(self, on: bool) -> None:
-        """Record the path of camera and light; switched off, it becomes the scene's motion."""
+        """Record the paths of camera and lights; switched off, they become the scene's motion."""
         if on and not self._recorder:
             self._recorder = Recorder()
         elif not on and self._recorder:
-            scene, self._recorder = self._recorder.apply(self.scene), None
-            emission = self.emission
-            self.use(scene)
-            self.emission = emission
+            recorder, self._recorder = self._recorder, None
+            lights = tuple(recorder.make_light(entry) for entry in self.lights.entries)
+            self.scene = replace(self.scene, camera=recorder.make_camera(self.camera), lights=lights)
+            self.lights.restart(lights)
+            self.time = 0.0
+            self._place()
 
     # The graph and its settings
 
@@ -208,18 +219,19 @@ class Session:
 
     def draw(self) -> bool:
         """Bring the picture up to date. Returns whether it changed."""
-        if self.playing:
-            self.time += 1 / FRAMES_PER_SECOND
-            self._place(self.scene.at(self.time))
-        if self._recorder:
-            self._recorder.add(clock.monotonic(), self.camera, self.spotlight)
         try:
+            if self.playing:
+                self.time += 1 / FRAMES_PER_SECOND
+                self._place()
+                self.lights.follow(self.time)
+            if self._recorder:
+                self._recorder.add(clock.monotonic(), self.camera, self.lights.entries)
             changed = self._update()
         except Error as error:
             self.error = str(error)
             self._undo()
             self._undo, self.drawn, self.accumulation = lambda: None, None, None
-            self._still = False
+            self._still = self.playing = False
             return False
         self.version += changed
         return changed
@@ -272,13 +284,6 @@ class Session:
         mean.show()
         return True
 
-    @property
-    def noise_text(self) -> str:
-        """An estimate of the mean's error, for the status line; "" without one."""
-        mean = self.accumulation
-        told = mean.latest if mean else None
-        return f", relMSE by noise about {told.noise * told.frames / mean.frames:.2g}" if mean and told else ""
-
     def output(self, source: tuple[str, str]) -> Any:
         """Return the resource that (pass, port) wrote last, None where the pass has not run yet."""
         try:
@@ -289,11 +294,6 @@ class Session:
     def image(self) -> Image:
         """Read the picture on screen."""
         return self.renderer.read(self.plan)
-
-    @property
-    def bounces(self) -> int:
-        """Bounces of indirect light that the graph makes."""
-        return max(find_parameters(self.renderer.graph(), "bounces").values(), default=1)
 
     def close(self) -> None:
         """Give back what is on the device."""

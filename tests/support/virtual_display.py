@@ -104,16 +104,13 @@ def frames(viewer: Viewer, count: int = 4) -> None:
 def restore(viewer: Viewer) -> None:
     """Bring the window back to the Cornell box, seen and lit as its file says, and undo all choices."""
     session, panel = viewer.session, viewer.panel
-    if session.scene is not cornell():
-        session.use(cornell())
-    session.look(cornell().camera)
-    session.shine(cornell().spotlight)
+    session.use(cornell())
     if (session.graph, session.settings) != ("deferred", FEW) or session.error:
         session.change("deferred", FEW)
     session.seed, session.from_light, session.playing, session.progressive = 0, False, False, False
     panel.reference.job.stop()
     panel.reference.job.result, panel.passes.pinned, panel.maps.light, panel.saved = None, None, 0, ""
-    viewer.controls.switches.update(frames=False, map=False, panel=True)
+    viewer.controls.switches.update(frames=False, outlines=False, map=False, panel=True)
     viewer.window.resize((SIZE[0] + WIDTH, SIZE[1]))
     act(viewer, "mousemove", 20, 20, frames=2)
     until = time.monotonic() + PATIENCE  # a busy display takes its time
@@ -160,8 +157,8 @@ class Spy:
 
 
 def arrange(viewer: Viewer, *opened: str) -> None:
-    """Open these parts of the panel and no others; by default Scene, Light and Passes."""
-    with Spy(viewer.panel, opened or ("Scene", "Light", "Passes")):
+    """Open these parts of the panel and no others; by default Scene, Lights and Passes."""
+    with Spy(viewer.panel, opened or ("Scene", "Lights", "Passes")):
         frames(viewer, 2)
 
 

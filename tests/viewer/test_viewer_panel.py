@@ -20,7 +20,7 @@ from deferred_ir.viewer.panels import side_panel as panels
 from deferred_ir.viewer.panels.light_axes import find_records
 from deferred_ir.viewer.panels.side_panel import WIDTH
 
-PARTS = ("Scene", "Light", "Passes", "Parameters", "Reference", "Shadow map", "Save", "Keys")
+PARTS = ("Scene", "Lights", "Passes", "Parameters", "Reference", "Shadow map", "Save", "Keys")
 TALL = 900
 """Height of a window in which all of the panel's rows show, beside a picture that is NARROW."""
 NARROW = 32
@@ -65,11 +65,11 @@ def test_hovering_an_output_shows_it_and_a_click_pins_it(tall):
 
 
 def test_what_is_left_out_is_dim_with_its_reason_and_what_it_saves(viewer):
-    viewer.session.shine(replace(viewer.session.spotlight, emission=(0.0, 0.0, 0.0)))
+    viewer.session.shine(replace(viewer.session.light, emission=(0.0, 0.0, 0.0)))
     viewer.frame()
     told = [word for name, word in words(viewer, viewer.panel.passes) if name == "text_disabled"]
     maps = next(word for word in told if word.startswith("shadow_maps"))
-    assert "no light needs one: the spotlight emits nothing; that saves about" in maps
+    assert "no light needs one: nothing shines; that saves about" in maps
     assert maps.endswith(" ms")
 
 
@@ -140,11 +140,11 @@ def test_no_word_of_the_panel_is_clipped(tall):
     viewer.controls.switches["map"] = True
     arrange(viewer, *PARTS)
     panel, known, right = viewer.panel, {}, viewer.window.size[0]
-    for part in (panel, panel.passes, panel.maps, panel.reference):
+    for part in (panel, panel.lights, panel.lights.fields, panel.passes, panel.maps, panel.reference):
         with Spy(part) as spy:
             viewer.frame()
         known |= spy.places
-    assert {"scene", "light FOV", "clamp", "paths a pixel", "linear depth"} <= known.keys()
+    assert {"scene", "camera FOV", "remove", "FOV", "clamp", "paths a pixel", "linear depth"} <= known.keys()
     assert not {name: place for name, place in known.items() if place[2] > right}
 
 
@@ -302,10 +302,10 @@ def test_a_reference_is_asked_for_by_a_button(tall, monkeypatch):
 def test_a_number_is_typed_into_a_slider(tall):
     """By Ctrl and click."""
     viewer = tall
-    x, y = middle(viewer, viewer.panel, "light FOV")
+    x, y = middle(viewer, viewer.panel.lights.fields, "FOV")
     act(viewer, "mousemove", "--sync", x, y, "keydown", "ctrl", "click", 1, "keyup", "ctrl")
     xdo("key", "ctrl+a")
     act(viewer, "type", "60")
     act(viewer, "key", "Return")
-    assert viewer.session.spotlight.fov == pytest.approx(60.0)
+    assert viewer.session.light.fov == pytest.approx(60.0)
     assert viewer.session.camera == cornell().camera, "keys in a field fly nothing"

@@ -67,7 +67,7 @@ def test_a_recorded_way_is_saved_and_plays(viewer, tmp_path, monkeypatch):
     monkeypatch.setattr(panels, "FOLDER", tmp_path)
     monkeypatch.setattr(path, "PERIOD", 0.0)
     session = viewer.session
-    start = session.spotlight
+    start = session.light
     session.switch_recording(True)
     viewer.frame()
     act(viewer, "keydown", "Right")
@@ -77,7 +77,7 @@ def test_a_recorded_way_is_saved_and_plays(viewer, tmp_path, monkeypatch):
     saved = load(tmp_path / "cornell-1.toml")
     assert saved.spotlight.motion == session.scene.spotlight.motion is not None
     assert saved.camera.motion is None
-    assert session.spotlight == start
+    assert session.light == start
     session.playing = True
     frames(viewer, 3)
-    assert session.spotlight != start
+    assert session.light != start

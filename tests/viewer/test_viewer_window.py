@@ -110,15 +110,15 @@ def test_a_window_is_closed_while_a_reference_is_traced(viewer, client):
 
 def test_a_frame_shows_all_input_that_came_before_it(viewer):
     """However slow frames are: what came while one was drawn is in the next, all of it, and no frame later."""
-    session, light = viewer.session, viewer.session.spotlight
+    session, light = viewer.session, viewer.session.light
     act(viewer, "mousemove", 40, 40)
     act(viewer, "mousedown", 3, frames=1)
     for x in (42, 47, 55, 60):
         xdo("mousemove", "--sync", x, 40)
     assert viewer.frame(0.05)
-    step = session.camera.axes @ np.subtract(session.spotlight.position, light.position)
+    step = session.camera.axes @ np.subtract(session.light.position, light.position)
     assert step[0] == pytest.approx(20 * session.scene.geometry.diagonal / 2 / SIZE[1])
-    expected = replace(cornell(), lights=(session.spotlight,))
+    expected = replace(cornell(), lights=(session.light,))
     assert np.array_equal(picture(viewer), rendered(expected, set=FEW))
     act(viewer, "mouseup", 3)
     before = session.camera

@@ -113,6 +113,9 @@ class Light(Protocol):
     def translate(self, by: Vec3) -> Light:
         """Return the light moved by a vector, at rest there."""
 
+    def outline(self, bounds: Bounds) -> Array:
+        """Return lines that show where it is and which way it shines, (n, 2, 3)."""
+
 
 class DirectLight(Light, Protocol):
     """A light that shaders evaluate."""

@@ -12,10 +12,11 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.base.colour import LUMINANCE
-from deferred_ir.sampling.warps import lift_to_hemisphere
+from deferred_ir.sampling.warps import build_basis, lift_to_hemisphere
 from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightView, end_outside, enter
 from deferred_ir.scene.lights.fields import Fault, PlacedLight
 from deferred_ir.scene.motion import LightMotion
+from deferred_ir.scene.outlines import SIZE, draw_arrow
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,13 @@ class Directional(PlacedLight):
         start = np.asarray(bounds.centre) - bounds.radius * self.axis
         x, y, z = start.tolist()
         return (LightView((x, y, z), self.axis, 0.0, reach=bounds.radius, depth=2 * bounds.radius),)
+
+    def outline(self, bounds: Bounds) -> Array:
+        """Return parallel arrows."""
+        length = SIZE * bounds.radius
+        right, up = build_basis(self.axis)
+        starts = np.asarray(self.position, float) + length / 2 * np.array([0 * up, right, up, -right, -up])
+        return np.concatenate([draw_arrow(start, self.axis, 2 * length) for start in starts])
 
 
 LIGHT = Directional

@@ -11,9 +11,11 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.sampling.warps import build_basis
+from deferred_ir.scene.lights.base import Bounds
 from deferred_ir.scene.lights.fields import Fault
 from deferred_ir.scene.lights.flat import FlatLight
 from deferred_ir.scene.motion import LightMotion
+from deferred_ir.scene.outlines import SIZE, draw_arrow, draw_circle
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,11 @@ class Disc(FlatLight):
         right, up = build_basis(self.axis)
         points: Array = np.asarray(self.position, float) + self.radius * (places[:, :1] * right + places[:, 1:] * up)
         return points
+
+    def outline(self, bounds: Bounds) -> Array:
+        """Return its edge and its normal."""
+        normal = draw_arrow(self.position, self.axis, SIZE * bounds.radius)
+        return np.concatenate([draw_circle(self.position, self.axis, self.radius), normal])
 
 
 LIGHT = Disc

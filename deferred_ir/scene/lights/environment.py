@@ -16,6 +16,7 @@ from deferred_ir.sampling.warps import disc_to_square, square_to_sphere
 from deferred_ir.scene.environment_image import EnvironmentImage, read_image
 from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples, end_outside, enter
 from deferred_ir.scene.lights.fields import CheckedLight, Fault
+from deferred_ir.scene.outlines import draw_arrow, draw_circle
 
 
 @dataclass(frozen=True)
@@ -126,6 +127,13 @@ class Environment(CheckedLight):
         """Return itself: it is infinitely far."""
         del by
         return self
+
+    def outline(self, bounds: Bounds) -> Array:
+        """Return a level circle below the scene, and an arrow to where the middle of its image lies."""
+        middle = self._turn(np.array([[0.0, 0.0, -1.0]]), 1)[0]
+        up = np.array([0.0, 1.0, 0.0])
+        foot = (bounds.centre - bounds.radius / 2 * up).tolist()
+        return np.concatenate([draw_circle(foot, up, bounds.radius), draw_arrow(foot, middle, bounds.radius)])
 
 
 LIGHT = Environment

@@ -15,6 +15,7 @@ from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightView, aim
 from deferred_ir.scene.lights.fields import Fault, PlacedLight
 from deferred_ir.scene.lights.sphere import sample_ball
 from deferred_ir.scene.motion import LightMotion
+from deferred_ir.scene.outlines import SIZE, draw_ball, draw_cross
 
 FACES = np.concatenate([np.eye(3), -np.eye(3)])
 """Where the views of its cube look."""
@@ -80,6 +81,11 @@ class Point(PlacedLight):
         """Return the faces of a cube about it."""
         del bounds
         return tuple(LightView(self.position, face, FACE_FOV, halvings=1) for face in FACES)
+
+    def outline(self, bounds: Bounds) -> Array:
+        """Return a cross, and its ball."""
+        cross = draw_cross(self.position, SIZE / 2 * bounds.radius)
+        return np.concatenate([cross, draw_ball(self.position, self.radius)]) if self.radius else cross
 
 
 LIGHT = Point

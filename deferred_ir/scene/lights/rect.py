@@ -11,9 +11,11 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.base.errors import format_value
 from deferred_ir.sampling.warps import disc_to_square
+from deferred_ir.scene.lights.base import Bounds
 from deferred_ir.scene.lights.fields import Fault, read_numbers
 from deferred_ir.scene.lights.flat import FlatLight
 from deferred_ir.scene.motion import LightMotion
+from deferred_ir.scene.outlines import SIZE, draw_arrow, draw_polygon
 
 
 @dataclass(frozen=True)
@@ -47,14 +49,26 @@ class Rect(FlatLight):
         """Its area, square scene units."""
         return self.size[0] * self.size[1]
 
-    def locate(self, places: Array) -> Array:
-        """Return points on it, (n, 3), for `places` (n, 2) of the unit disc."""
+    @property
+    def _sides(self) -> tuple[Array, Array]:
+        """Its sides across and along `up`."""
         across = np.cross(self.axis, self.up)
         across /= np.linalg.norm(across)
-        along = np.cross(across, self.axis)
-        square = (disc_to_square(places) - 0.5) * self.size
+        return self.size[0] * across, self.size[1] * np.cross(across, self.axis)
+
+    def locate(self, places: Array) -> Array:
+        """Return points on it, (n, 3), for `places` (n, 2) of the unit disc."""
+        across, along = self._sides
+        square = disc_to_square(places) - 0.5
         points: Array = np.asarray(self.position, float) + square[:, :1] * across + square[:, 1:] * along
         return points
+
+    def outline(self, bounds: Bounds) -> Array:
+        """Return its edges and its normal."""
+        across, along = self._sides
+        corners = np.array([-across - along, across - along, across + along, along - across]) / 2
+        normal = draw_arrow(self.position, self.axis, SIZE * bounds.radius)
+        return np.concatenate([draw_polygon(np.asarray(self.position, float) + corners), normal])
 
 
 LIGHT = Rect

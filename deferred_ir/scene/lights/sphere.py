@@ -14,6 +14,7 @@ from deferred_ir.sampling.warps import build_basis, disc_to_sphere, lift_to_hemi
 from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples
 from deferred_ir.scene.lights.fields import Fault, PlacedLight
 from deferred_ir.scene.motion import LightMotion
+from deferred_ir.scene.outlines import draw_ball
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,11 @@ class Sphere(PlacedLight):
         del bounds
         assert places is not None
         return sample_ball(np.asarray(self.position, float), self.radius, at, places)
+
+    def outline(self, bounds: Bounds) -> Array:
+        """Return circles of it."""
+        del bounds
+        return draw_ball(self.position, self.radius)
 
 
 def sample_ball(centre: Array, radius: float, at: Array, places: Array) -> Arrivals:

@@ -16,6 +16,7 @@ from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightView, aim
 from deferred_ir.scene.lights.fields import Fault, PlacedLight
 from deferred_ir.scene.lights.spotlight import one_minus_cos
 from deferred_ir.scene.motion import LightMotion
+from deferred_ir.scene.outlines import SIZE, draw_arrow, draw_cone
 
 NARROWEST = 1e-3
 """Least difference of the cosines of both cones, as in KHR_lights_punctual."""
@@ -107,6 +108,12 @@ class Spot(PlacedLight):
         """Return its only view: all of its cone."""
         del bounds
         return (LightView(self.position, self.axis, self.fov),)
+
+    def outline(self, bounds: Bounds) -> Array:
+        """Return both of its cones and its axis."""
+        length = SIZE * bounds.radius
+        cones = [draw_cone(self.position, self.axis, fov, length) for fov in {self.fov, self.inner_fov} - {0.0}]
+        return np.concatenate([*cones, draw_arrow(self.position, self.axis, 1.5 * length)])
 
 
 LIGHT = Spot

@@ -16,6 +16,7 @@ from deferred_ir.sampling.warps import build_basis, lift_to_hemisphere
 from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightView, aim
 from deferred_ir.scene.lights.fields import Fault, PlacedLight
 from deferred_ir.scene.motion import LightMotion
+from deferred_ir.scene.outlines import SIZE, draw_arrow, draw_circle, draw_cone
 
 
 @dataclass(frozen=True)
@@ -103,6 +104,13 @@ class Spotlight(PlacedLight):
         """Return its only view: all of its cone."""
         del bounds
         return (LightView(self.position, self.axis, self.fov),)
+
+    def outline(self, bounds: Bounds) -> Array:
+        """Return its cone, its axis and its disc."""
+        length = SIZE * bounds.radius
+        cone = draw_cone(self.position, self.axis, self.fov, length)
+        disc = [draw_circle(self.position, self.axis, self.radius)] if self.radius else []
+        return np.concatenate([cone, draw_arrow(self.position, self.axis, 1.5 * length), *disc])
 
 
 def one_minus_cos(fov: float) -> float:

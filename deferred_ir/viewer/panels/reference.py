@@ -7,6 +7,7 @@ from typing import Any
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.graph import Plan
 from deferred_ir.graph.ports import Texture
+from deferred_ir.graph.roles import find_parameters
 from deferred_ir.viewer.canvas import Area, Canvas
 from deferred_ir.viewer.reference_job import ReferenceJob
 from deferred_ir.viewer.session import Session
@@ -30,13 +31,16 @@ class ReferencePanel:
     @property
     def _matches(self) -> bool:
         """Whether there is a reference of what is on screen."""
-        session = self._session
-        return self.job.matches(session.shown, session.size, session.bounces)
+        return self.job.matches(self._session.shown, self._session.size, self._bounces)
+
+    @property
+    def _bounces(self) -> int:
+        """Bounces of indirect light that the graph makes."""
+        return max(find_parameters(self._session.renderer.graph(), "bounces").values(), default=1)
 
     def start(self) -> None:
         """Trace a reference of what is on screen."""
-        session = self._session
-        self.job.start(session.shown, session.size, SPP[self._spp], session.bounces)
+        self.job.start(self._session.shown, self._session.size, SPP[self._spp], self._bounces)
 
     def draw(self) -> None:
         """Draw controls and figures."""

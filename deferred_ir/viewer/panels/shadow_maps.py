@@ -1,9 +1,11 @@
-"""Shadow maps in the lower left corner: the spotlight's or that of any VPL, whichever pass draws them."""
+"""Shadow maps in the lower left corner: those of any light or VPL, whichever pass draws them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.gl.textures import GpuTexture
@@ -53,8 +55,10 @@ class ShadowMapsPanel:
         maps = []
         for subpass in step.work.subpasses(step.descriptions, state):
             if {"light", "layer", "tile", "size"} <= subpass.keys():
-                y, x = divmod(subpass["tile"], texture.size[0] // subpass["size"])
-                place = Area(x * subpass["size"], y * subpass["size"], subpass["size"], subpass["size"])
+                size = subpass["size"]
+                y, x = divmod(subpass["tile"], texture.size[0] // size)
+                left, bottom = subpass.get("corner", (x * size, y * size))
+                place = Area(left, bottom, size, size)
                 maps.append(Map(subpass["light"], subpass["state"], texture, subpass["layer"], place))
         return maps
 
@@ -68,9 +72,10 @@ class ShadowMapsPanel:
         lights, vpls = (find_records(self._session, kind) for kind in ("light", "vpl"))
         if len(lists) != 2 or lights is None or vpls is None:
             return []
-        views = lights["view"][find_shining(lights)].astype(int).tolist()
+        owners = np.repeat(np.arange(len(lights)), lights["views"].astype(int))
+        views = np.flatnonzero(find_shining(lights)[owners]).tolist()
         tiles = sorted(vpls["tile"][find_shining(vpls)].astype(int).tolist())
-        maps = [Map("spotlight", "", lists[0][view]) for view in views]
+        maps = [Map(f"light {owners[view] + 1}", "", lists[0][view]) for view in views]
         return maps + [Map(f"vpl {tile}", "", lists[1][tile]) for tile in tiles]
 
     def edge(self, area: Area) -> int:
@@ -90,7 +95,7 @@ class ShadowMapsPanel:
         chosen = maps[min(self.light, most)]
         label = f"{chosen.light}, {chosen.state}" if chosen.state else chosen.light
         _, self.light = imgui.slider_int("light", min(self.light, most), 0, most, label)
-        imgui.set_item_tooltip("the spotlight's, unless rays replace it; the VPLs follow by the tiles of their maps")
+        imgui.set_item_tooltip("those of lights, unless rays replace them; the VPLs follow by the tiles of their maps")
         _, self.intensity = imgui.slider_float(
             "intensity", self.intensity, 0.01, 100.0, "%.3g", imgui.SliderFlags_.logarithmic
         )

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from deferred_ir.base.errors import Error
+from deferred_ir.engine.accumulation import Accumulation
 from deferred_ir.frame.vpl_params import VPLS_ALIVE
 from deferred_ir.gl.window import Window
 from deferred_ir.graph.file import graph_names
@@ -15,7 +16,10 @@ from deferred_ir.graph.params import specs
 from deferred_ir.loading.load import builtin_scenes
 from deferred_ir.viewer.canvas import Area, Canvas
 from deferred_ir.viewer.controls import KEYS, Controls
-from deferred_ir.viewer.panels import light_axes
+from deferred_ir.viewer.panels.light_axes import draw_axes
+from deferred_ir.viewer.panels.light_outlines import draw_outlines
+from deferred_ir.viewer.panels.lights import LightsPanel
+from deferred_ir.viewer.panels.lines import Overlay
 from deferred_ir.viewer.panels.parameters import draw_widget
 from deferred_ir.viewer.panels.passes import PassesPanel
 from deferred_ir.viewer.panels.reference import ReferencePanel
@@ -25,7 +29,6 @@ from deferred_ir.viewer.session import Session
 
 WIDTH = 380
 """Of the panel, pixels at 96 dots an inch."""
-BRIGHTEST = 100.0
 FOLDER = Path()
 """Where pictures are saved: the working folder."""
 
@@ -38,6 +41,7 @@ class Panel:
 
         self._imgui, self._implot = imgui, implot
         self._window, self._session, self._controls = window, session, controls
+        self.lights = LightsPanel(imgui, session, controls)
         self.passes = PassesPanel(imgui, session)
         self.maps = ShadowMapsPanel(imgui, session, controls)
         self.reference = ReferencePanel(imgui, session)
@@ -58,10 +62,13 @@ class Panel:
         return session.playing or session.progressive or session.recording or self.reference.job.running
 
     def draw(self, area: Area) -> None:
-        """Draw all controls of this frame, and the axes of the lights over the picture in `area`."""
+        """Draw all controls of this frame, and lights and VPLs as lines over the picture in `area`."""
         imgui, (width, height) = self._imgui, self._window.size
+        overlay = Overlay(imgui, self._session, area, height, self.maps.edge(area))
         if self._controls.switches["frames"]:
-            light_axes.draw_axes(imgui, self._session, area, height, self.maps.edge(area))
+            draw_axes(overlay)
+        if self._controls.switches["outlines"]:
+            draw_outlines(overlay)
         if self.width == 0 or height == 0:
             return
         imgui.set_next_window_pos(imgui.ImVec2(width - self.width, 0))
@@ -72,7 +79,7 @@ class Panel:
         self._status()
         for name, part, is_open in (
             ("Scene", self._scene, True),
-            ("Light", self._light, True),
+            ("Lights", self.lights.draw, True),
             ("Passes", self.passes.draw, True),
             ("Parameters", self._parameters, False),
             ("Reference", self.reference.draw, False),
@@ -95,14 +102,14 @@ class Panel:
         lights = "" if alive is None else f", {alive} VPLs"
         imgui.text(f"{session.scene.name}, {session.size[0]}x{session.size[1]}{lights}, {last}")
         if session.accumulation:
-            imgui.text(f"mean of {session.accumulation.frames} frames{session.noise_text}")
+            imgui.text(f"mean of {session.accumulation.frames} frames{_describe_noise(session.accumulation)}")
         if distance := self.reference.text:
             imgui.text(distance)
         if self.saved:
             imgui.text_wrapped(self.saved)
-        if session.error:
+        if error := session.error or session.lights.error:
             imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(1.0, 0.45, 0.4, 1.0))
-            imgui.text_wrapped(session.error)
+            imgui.text_wrapped(error)
             imgui.pop_style_color()
         size = imgui.ImVec2(-1, 90 * self._window.scale)
         plot, flags = self._implot, self._implot.Flags_
@@ -132,33 +139,11 @@ class Panel:
             session.invalidate()
         _, session.progressive = imgui.checkbox("progressive (Space)", session.progressive)
         imgui.set_item_tooltip("Average frames with new samples while nothing moves.")
-        if session.scene.moves:
-            _, session.playing = imgui.checkbox("play motions (P)", session.playing)
-
-    def _light(self) -> None:
-        imgui, session = self._imgui, self._session
-        light = session.spotlight
-        most = max(session.emission)
-        now = max(light.emission) / most if most else 0.0
-        touched, power = imgui.slider_float("intensity", now, 0.0, BRIGHTEST, "%.3g", imgui.SliderFlags_.logarithmic)
-        imgui.set_item_tooltip("Factor on the emission in the scene file.")
-        if touched:
-            r, g, b = session.emission
-            session.shine(replace(light, emission=(r * power, g * power, b * power)))
-        touched, fov = imgui.slider_float("light FOV", light.fov, 1.0, 179.0, "%.1f degrees")
-        if touched:
-            session.shine(replace(light, fov=fov))
         touched, fov = imgui.slider_float("camera FOV", session.camera.fov, 5.0, 150.0, "%.1f degrees")
         if touched:
             session.look(replace(session.camera, fov=fov))
-        if imgui.button("light to camera (L)"):
-            self._controls.move_light_to_camera()
-        imgui.same_line()
-        touched, session.from_light = imgui.checkbox("see from the light (V)", session.from_light)
-        if touched:
-            session.invalidate()
-        switches = self._controls.switches
-        _, switches["frames"] = imgui.checkbox("light and VPLs as axes (F)", switches["frames"])
+        if session.scene.moves:
+            _, session.playing = imgui.checkbox("play motions (P)", session.playing)
 
     def _parameters(self) -> None:
         imgui, session = self._imgui, self._session
@@ -180,8 +165,8 @@ class Panel:
         if imgui.button("save PNG, EXR and scene file (Ctrl S)"):
             self._controls.save()
         imgui.set_item_tooltip("Writes to the folder that the viewer was started in.")
-        touched, on = imgui.checkbox("record camera and light", session.recording)
-        imgui.set_item_tooltip("When switched off, the path becomes the scene's motion: it can be played and is saved.")
+        touched, on = imgui.checkbox("record camera and lights", session.recording)
+        imgui.set_item_tooltip("When switched off, paths become the scene's motions: they can be played and are saved.")
         if touched:
             session.switch_recording(on)
 
@@ -210,3 +195,9 @@ class Panel:
     def close(self) -> None:
         """End work in the background."""
         self.reference.close()
+
+
+def _describe_noise(mean: Accumulation) -> str:
+    """Return an estimate of the error of a mean of frames; "" before there is one."""
+    told = mean.latest
+    return f", relMSE by noise about {told.noise * told.frames / mean.frames:.2g}" if told else ""

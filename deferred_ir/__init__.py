@@ -27,6 +27,14 @@ if TYPE_CHECKING:
     from deferred_ir.loading.load import builtin_scenes as builtin_scenes
     from deferred_ir.loading.load import load as load
     from deferred_ir.output.image import Image as Image
+    from deferred_ir.scene.lights.directional import Directional as Directional
+    from deferred_ir.scene.lights.disc import Disc as Disc
+    from deferred_ir.scene.lights.environment import Environment as Environment
+    from deferred_ir.scene.lights.point import Point as Point
+    from deferred_ir.scene.lights.rect import Rect as Rect
+    from deferred_ir.scene.lights.sphere import Sphere as Sphere
+    from deferred_ir.scene.lights.spot import Spot as Spot
+    from deferred_ir.scene.lights.spotlight import Spotlight as Spotlight
     from deferred_ir.scene.scene import Scene as Scene
 
 _NAMES = {
@@ -43,6 +51,14 @@ _NAMES = {
     "engine.renderer": ("Renderer",),
     "loading.load": ("builtin_scenes", "load"),
     "output.image": ("Image",),
+    "scene.lights.directional": ("Directional",),
+    "scene.lights.disc": ("Disc",),
+    "scene.lights.environment": ("Environment",),
+    "scene.lights.point": ("Point",),
+    "scene.lights.rect": ("Rect",),
+    "scene.lights.sphere": ("Sphere",),
+    "scene.lights.spot": ("Spot",),
+    "scene.lights.spotlight": ("Spotlight",),
     "scene.scene": ("Scene",),
 }
 _WHERE = {name: module for module, names in _NAMES.items() for name in names}

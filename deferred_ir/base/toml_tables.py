@@ -109,6 +109,14 @@ class Table:
             return None
         return value
 
+    def boolean(self, key: str, *, default: bool) -> bool:
+        """Return true or false."""
+        value = self.data.get(key, default)
+        if not isinstance(value, bool):
+            self.fault(key, f"must be true or false, not {format_value(value)}")
+            return default
+        return value
+
     def integer(self, key: str) -> int | None:
         """Return an integer of 0 or more."""
         if self._missing(key, needed=False):

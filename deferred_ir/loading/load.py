@@ -8,7 +8,7 @@ from pathlib import Path
 
 from deferred_ir.base.errors import SceneError, did_you_mean
 from deferred_ir.loading import default_views, merge, models, scene_file
-from deferred_ir.loading.model_data import ModelData
+from deferred_ir.loading.model_data import ModelData, darken
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.scene import Scene
@@ -55,7 +55,8 @@ def load(scene: str | os.PathLike[str]) -> Scene:
 def _read_model(entry: ModelEntry, path: Path, index: int, count: int) -> ModelData:
     """Read the model of an entry; an error says which entry of which scene file names it."""
     try:
-        return models.read(entry.path, entry.scale, entry.translate, root=path.parent)
+        read = models.read(entry.path, entry.scale, entry.translate, root=path.parent)
+        return read if entry.lights else darken(read)
     except SceneError as error:
         if entry.path == path:
             raise

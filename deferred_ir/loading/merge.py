@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,7 +21,7 @@ def merge(
     """Join all models to geometry, materials, textures and vertex ranges; `file` is what an error message names.
 
     Equal materials and equal images become one. Vertices stay in the order of models and parts; faces are sorted by
-    texture, otherwise in that order too. Raises SceneError where everything lies in one point.
+    texture and texture of emission, otherwise in that order too. Raises SceneError where everything lies in one point.
     """
     materials: dict[Material, int] = {}
     textures: dict[tuple[tuple[int, ...], bytes], tuple[int, Texture]] = {}
@@ -29,16 +30,20 @@ def merge(
     starts = np.concatenate([[0], np.cumsum(counts)])
     if starts[-1] >= 2**31:
         raise SceneError(f"{file}: {starts[-1]} vertices are more than 32-bit indices reach; give smaller models")
-    face_materials, face_textures = [], []
+    face_materials, face_textures, face_glows = [], [], []
+
+    def number(texture: Texture | None) -> int | None:
+        if texture is None:
+            return None
+        return textures.setdefault((texture.pixels.shape, texture.pixels.tobytes()), (len(textures), texture))[0]
+
     for part in parts:
-        texture = -1
-        if part.texture is not None:
-            pixels = part.texture.pixels
-            texture, _ = textures.setdefault((pixels.shape, pixels.tobytes()), (len(textures), part.texture))
-        material = Material(part.material.name, part.material.albedo, None if texture < 0 else texture)
+        texture, glow = number(part.texture), number(part.glow)
+        material = replace(part.material, texture=texture, emission_texture=glow)
         face_materials.append(np.full(len(part.faces), materials.setdefault(material, len(materials))))
-        face_textures.append(np.full(len(part.faces), texture))
-    order = np.argsort(np.concatenate(face_textures), kind="stable")
+        face_textures.append(np.full(len(part.faces), -1 if texture is None else texture))
+        face_glows.append(np.full(len(part.faces), -1 if glow is None else glow))
+    order = np.lexsort((np.concatenate(face_glows), np.concatenate(face_textures)))
     faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])
     ranges, first = [], 0
     for model, motion in models:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,15 +18,16 @@ GREY = (0.8, 0.8, 0.8)
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One mesh of a model file, placed in the world, with one material.
+    """One mesh of a model file, placed in the world, with one material, whose textures' numbers do not count.
 
-    Arrays are as in `Geometry`; uvs are None without a texture.
+    Arrays are as in `Geometry`; uvs are None without a texture. glow: the texture of emission.
     """
 
     positions: Array
     faces: Ints
     material: Material
     texture: Texture | None
+    glow: Texture | None
     normals: Array | None
     uvs: Array | None
     colors: Array | None
@@ -39,6 +40,29 @@ class ModelData:
     name: str
     parts: tuple[Part, ...]
     notes: tuple[str, ...]
+
+
+def check_emission(values: Any, where: str) -> Vec3:
+    """Return a file's linear RGB as radiance: one number stands for all three.
+
+    Raises SceneError unless all are finite numbers of 0 or more.
+    """
+    numbers = [float(value) for value in np.ravel(values)]
+    numbers = numbers * 3 if len(numbers) == 1 else numbers[:3]
+    if len(numbers) != 3 or not all(math.isfinite(value) and value >= 0 for value in numbers):
+        raise SceneError(f"{where}: emission {numbers} must be three finite numbers of 0 or more; mend the file")
+    red, green, blue = numbers
+    return red, green, blue
+
+
+def darken(model: ModelData) -> ModelData:
+    """Return a model none of whose surfaces emits."""
+
+    def turn_off(part: Part) -> Part:
+        material = replace(part.material, emission=(0.0, 0.0, 0.0), emits_both_sides=False)
+        return replace(part, material=material, glow=None)
+
+    return replace(model, parts=tuple(turn_off(part) for part in model.parts))
 
 
 def check_albedo(values: Any, where: str, notes: list[str]) -> Vec3:

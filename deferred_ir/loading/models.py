@@ -66,6 +66,7 @@ class _Reader:
     def __init__(self, format: ModelFormat) -> None:
         self.format, self.path, self.notes = format, format.path, format.notes
         self.textures: dict[int, Texture] = {}
+        self.images: list[Any] = []
         self.texels = 0
 
     def read(self, scale: float, translate: Vec3) -> ModelData:
@@ -119,7 +120,9 @@ class _Reader:
             raise SceneError(f"{self.path}: vertices are not three numbers each; export it again")
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise SceneError(f"{self.path}: a face uses a vertex that does not exist; export it again")
-        material, texture, colors, uvs = self._read_appearance(mesh, len(vertices), len(faces))
+        colors, uvs = self._read_attributes(mesh, len(vertices), len(faces))
+        material, texture, glow = self._read_material(mesh, colored=colors is not None, has_uvs=uvs is not None)
+        uvs = uvs if texture or glow else None
         if colors is not None and len(colors) == len(faces) and len(colors) != len(vertices):
             # Colours per face: give each face vertices of its own.
             corners = faces.ravel()
@@ -133,7 +136,7 @@ class _Reader:
             faces = faces[:, ::-1]
         if normals is not None:
             normals = _transform_normals(normals, linear)
-        return Part(positions, faces, material, texture, normals, uvs, colors)
+        return Part(positions, faces, material, texture, glow, normals, uvs, colors)
 
     def _check_positions(self, positions: Array) -> None:
         bad = int((~np.isfinite(positions).all(axis=1)).sum())
@@ -142,10 +145,8 @@ class _Reader:
         if np.abs(positions).max() > LARGEST:
             raise SceneError(f"{self.path}: vertices farther out than {LARGEST:g}; scale the model down")
 
-    def _read_appearance(
-        self, mesh: Any, vertices: int, faces: int
-    ) -> tuple[Material, Texture | None, Array | None, Array | None]:
-        """Return material, texture, linear colours of vertices or faces, and texture coordinates."""
+    def _read_attributes(self, mesh: Any, vertices: int, faces: int) -> tuple[Array | None, Array | None]:
+        """Return linear colours of vertices or faces, and texture coordinates."""
         colors, uvs = self.format.read_colors(mesh), getattr(mesh.visual, "uv", None)
         if colors is not None and len(colors) not in (vertices, faces):
             self.notes.append(f"{self.path.name}: colours do not fit the vertices and are ignored")
@@ -154,25 +155,36 @@ class _Reader:
         if uvs is not None and not np.isfinite(uvs).all():
             self.notes.append(f"{self.path.name}: texture coordinates that are NaN or infinite are taken as 0")
             uvs[~np.isfinite(uvs)] = 0
-        if uvs is not None and len(uvs):
-            uvs = move_uvs_home(uvs)
+        return colors, move_uvs_home(uvs) if uvs is not None and len(uvs) else uvs
+
+    def _read_material(
+        self, mesh: Any, *, colored: bool, has_uvs: bool
+    ) -> tuple[Material, Texture | None, Texture | None]:
+        """Return a mesh's material, and its textures of reflectance and of emission."""
         source = getattr(mesh.visual, "material", None)
-        name, albedo, image, image_name = self.format.read_reflectance(source, colored=colors is not None)
-        if image is not None and uvs is None:
-            self.notes.append(f"{self.path.name}: no texture coordinates for {image_name}; its plain colour is taken")
-            image = None
-        elif image is not None and self.format.image_replaces_albedo:
+        name, albedo, image, image_name = self.format.read_reflectance(source, colored=colored)
+        emission = self.format.read_emission(source)
+        texture = self._read_texture(image, image_name, has_uvs=has_uvs)
+        if texture is not None and self.format.image_replaces_albedo:
             albedo = WHITE
+        glow = self._read_texture(emission.image, emission.image_name, has_uvs=has_uvs)
+        material = Material(name, albedo, emission=emission.radiance, emits_both_sides=emission.both_sides)
+        return material, texture, glow
+
+    def _read_texture(self, image: Any, name: str, *, has_uvs: bool) -> Texture | None:
+        """Return the texture of a PIL image, None for none; an image is decoded once."""
         if image is None:
-            return Material(name, albedo), None, colors, None
-        texture = self.textures.get(id(image))
-        if texture is None:
+            return None
+        if not has_uvs:
+            self.notes.append(f"{self.path.name}: no texture coordinates for {name}; its plain colour is taken")
+            return None
+        if id(image) not in self.textures:
             self.texels += image.width * image.height
             if self.texels > MOST_TEXELS:
                 raise SceneError(f"{self.path}: its images have more than {MOST_TEXELS} pixels; scale them down")
-            texture = decode_texture(image, image_name, self.notes)
-            self.textures[id(image)] = texture
-        return Material(name, albedo), texture, colors, uvs
+            self.textures[id(image)] = decode_texture(image, name, self.notes)
+            self.images.append(image)  # its id must stay its own
+        return self.textures[id(image)]
 
 
 def move_uvs_home(uvs: Array) -> Array:

@@ -26,12 +26,16 @@ NAME = re.compile(r"[^/\\%\x00-\x1f\x7f]{1,100}")
 
 @dataclass(frozen=True)
 class ModelEntry:
-    """One [[model]]: its file (resolved against the scene file's folder), `scale`, then `translate`."""
+    """One [[model]]: its file (resolved against the scene file's folder), `scale`, then `translate`.
+
+    lights: whether what its file says to shine does.
+    """
 
     path: Path
     scale: float = 1.0
     translate: Vec3 = (0.0, 0.0, 0.0)
     motion: ModelMotion | None = None
+    lights: bool = True
 
 
 @dataclass(frozen=True)
@@ -72,13 +76,14 @@ def _read_models(root: Table, folder: Path) -> tuple[ModelEntry, ...]:
     models = []
     for index, entry in enumerate(entries):
         name = "model" if len(entries) == 1 else f"model[{index}]"
-        table = Table(root.faults, name, entry, ("path", "scale", "translate", "motion"))
+        table = Table(root.faults, name, entry, ("path", "scale", "translate", "motion", "lights"))
         path = table.string("path", needed=True, mend="the model's file")
         scale = table.number("scale", 1.0)
         if scale <= 0:
             table.fault("scale", f"must be above 0, not {scale}")
         translate = table.vec3("translate", needed=False) or (0.0, 0.0, 0.0)
-        models.append(ModelEntry(folder / (path or ""), scale, translate, _read_model_motion(table)))
+        lights = table.boolean("lights", default=True)
+        models.append(ModelEntry(folder / (path or ""), scale, translate, _read_model_motion(table), lights))
     return tuple(models)
 
 

@@ -54,6 +54,8 @@ def make_tables(scene: SceneFile) -> dict[str, Any]:
 
 def _make_model(entry: ModelEntry) -> dict[str, Any]:
     table: dict[str, Any] = {"path": str(entry.path), "scale": entry.scale, "translate": list(entry.translate)}
+    if not entry.lights:
+        table["lights"] = False
     if entry.motion:
         table["motion"] = _make_model_motion(entry.motion)
     return table

@@ -188,7 +188,6 @@ def test_what_is_not_honoured_is_noted(tmp_path: Path) -> None:
     assert load(document.write(tmp_path / "m.gltf")).notes == (
         "m.gltf: not honoured: KHR_materials_unlit, KHR_texture_transform",
         "m.gltf: its lights and cameras are ignored",
-        "m.gltf: emission is ignored",
         "m.gltf: transparency is ignored",
         "m.gltf: metals are taken as matt surfaces of their base colour",
         "m.gltf: texture coordinates other than the first set are not honoured",
@@ -289,3 +288,36 @@ def test_a_damaged_glb_gives_a_scene_or_one_line(tmp_path: Path, data: st.DataOb
     except SceneError as error:
         message = str(error)
     assert len(message.splitlines()) == 1
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_emission_times_its_strength_and_image(tmp_path: Path, both: bool) -> None:
+    glow = {"emissiveFactor": [0.5, 1, 0.25], "emissiveTexture": {"index": 0}, "doubleSided": both}
+    strength = {"extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}}}
+    document = Document(
+        materials=[{**glow, **strength}, {"emissiveFactor": [0, 0, 2]}, {}],
+        textures=[{"source": 0}],
+        images=[{"uri": png((255, 128, 0))}],
+        extensionsUsed=["KHR_materials_emissive_strength"],
+    )
+    for material in range(3):
+        document.triangle({"material": material}, TEXCOORD_0=document.accessor(UVS))
+    scene = load(document.write(tmp_path / "m.gltf"))
+    assert scene.notes == ()
+    first, second, third = sorted(scene.materials, key=lambda material: material.name)
+    assert (first.emission, first.emits_both_sides) == ((4.0, 8.0, 2.0), both)
+    assert first.texture is None
+    assert first.emission_texture == 0
+    assert (second.emission, second.emission_texture, second.emits_both_sides) == ((0.0, 0.0, 2.0), None, False)
+    assert third.emission == (0.0, 0.0, 0.0)
+    assert scene.surface_light is not None
+    sides = 2 if both else 1
+    assert len(scene.surface_light.faces) == sides + 1
+
+
+def test_an_image_of_emission_that_is_missing_is_told(tmp_path: Path) -> None:
+    glow = {"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}
+    document = Document(materials=[glow], textures=[{"source": 0}], images=[{"uri": "glow.png"}])
+    document.triangle({"material": 0}, TEXCOORD_0=document.accessor(UVS))
+    with pytest.raises(SceneError, match=r"image glow\.png is missing or not readable"):
+        load(document.write(tmp_path / "m.gltf"))

@@ -22,7 +22,7 @@ from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.materials import Texture
 from deferred_ir.scene.scene import Scene
-from deferred_ir.scene.surface_colours import look_up_albedo, sample_texture
+from deferred_ir.scene.surface_colours import look_up_albedo, look_up_emission, sample_texture
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 FACES = "usemtl m\nf 1/1 2/2 3/3 4/4\n"
@@ -181,9 +181,33 @@ def test_texture_coordinates_that_are_no_numbers(tmp_path: Path) -> None:
     assert any("NaN or infinite" in note for note in scene.notes)
 
 
-def test_emission_is_noted(tmp_path: Path) -> None:
-    assert any("emission" in note for note in scene_with(tmp_path, "newmtl m\nKd 1 1 1\nKe 17 12 4\n").notes)
-    assert scene_with(tmp_path, "newmtl m\nKd 1 1 1\nKe 0 0 0\n").notes == ()
+def test_ke_emits_from_both_sides(tmp_path: Path) -> None:
+    scene = scene_with(tmp_path, "newmtl m\nKd 1 1 1\nKe 17 12 4\n")
+    assert scene.notes == ()
+    assert scene.materials[0].emission == (17.0, 12.0, 4.0)
+    assert scene.materials[0].emits_both_sides
+    dark = scene_with(tmp_path, "newmtl m\nKd 1 1 1\nKe 0 0 0\n")
+    assert dark.surface_light is None
+
+
+def test_map_ke_is_a_texture_of_emission(tmp_path: Path) -> None:
+    Image.fromarray(np.array([[[255, 0, 0], [0, 0, 255]]], np.uint8)).save(tmp_path / "glow.png")
+    mtl = "newmtl m\nKd 0.5 0.5 0.5\nKe 2 2 2\nmap_Ke glow.png\n"
+    scene = scene_with(
+        tmp_path, mtl, "usemtl m\nf 1/1 2/2 3/3\n", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+    )
+    assert (scene.materials[0].texture, scene.materials[0].emission_texture) == (None, 0)
+    found = look_up_emission(
+        scene.geometry, scene.materials, scene.textures, np.array([0, 0]), np.array([[0.75, 0.25, 0], [0.25, 0.75, 0]])
+    )
+    assert found == pytest.approx(np.array([[2, 0, 0], [0, 0, 2.0]]))
+    with pytest.raises(SceneError, match=r"image none\.png is missing"):
+        scene_with(tmp_path, mtl.replace("glow", "none"))
+
+
+def test_negative_emission_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"material m: emission \[1\.0, -2\.0, 1\.0\] must be three finite numbers"):
+        scene_with(tmp_path, "newmtl m\nKd 1 1 1\nKe 1 -2 1\n")
 
 
 GREYS = np.array([[0, 128], [200, 255]], np.uint8)

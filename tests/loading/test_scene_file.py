@@ -143,7 +143,10 @@ CASES = {
     "unknown table": ("[camra]", "camra: unknown key; did you mean 'camera'?"),
     "unknown key": (CAMERA + "fow = 60", "camera.fow: unknown key; did you mean 'fov'?"),
     "unknown key with a line break": ('"a\\nb" = 1', "a b: unknown key"),
-    "unknown key of a model": (MODEL + "size = 2", "model[1].size: unknown key; known: motion, path, scale, translate"),
+    "unknown key of a model": (
+        MODEL + "size = 2",
+        "model[1].size: unknown key; known: lights, motion, path, scale, translate",
+    ),
     "no path": ("[[model]]", "model[1].path: missing; give the model's file"),
     "path of a wrong type": ("[[model]]\npath = 3", "model[1].path: must be a string"),
     "name of a wrong type": ("name = 3", 'name: must be a string such as "name", not 3'),

@@ -36,7 +36,7 @@ LIGHTS = (
     Environment(radiance=(0.5, 0.5, 1.0), rotation=30.0, scale=2.0),
     LIGHT,
 )
-MODELS = (ModelEntry(Path("/models/a b.obj"), 0.5, A, MOTION), ModelEntry(Path("/models/ü.glb")))
+MODELS = (ModelEntry(Path("/models/a b.obj"), 0.5, A, MOTION), ModelEntry(Path("/models/ü.glb"), lights=False))
 RENDER = RenderDefaults("accurate", (640, 480), 32, 7, {"tonemap.exposure": "auto", "vpl.clamp": 0.1, "vpl.bounces": 2})
 
 

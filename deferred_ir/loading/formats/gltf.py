@@ -22,12 +22,13 @@ from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import SceneError, format_value
 from deferred_ir.loading.asset_paths import Assets
 from deferred_ir.loading.formats import gltf_checks
-from deferred_ir.loading.formats.model_format import ModelFormat, Reflectance, choose_plain_albedo
-from deferred_ir.loading.model_data import check_albedo
+from deferred_ir.loading.formats.model_format import Emission, ModelFormat, Reflectance, choose_plain_albedo
+from deferred_ir.loading.model_data import check_albedo, check_emission
 
+STRENGTH = "KHR_materials_emissive_strength"
 TRIANGLES, STRIP, FLOAT, REPEAT = 4, 5, 5126, 10497
-HONOURED = {"EXT_texture_webp", "KHR_mesh_quantization"}
-ELSEWHERE = {"KHR_lights_punctual", "KHR_materials_emissive_strength"}
+HONOURED = {"EXT_texture_webp", "KHR_mesh_quantization", STRENGTH}
+ELSEWHERE = {"KHR_lights_punctual"}
 """Extensions that have notes of their own."""
 COMPRESSED = {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
 GLOSSY = "KHR_materials_pbrSpecularGlossiness"
@@ -46,12 +47,23 @@ class BaseColor:
 
 
 @dataclass(frozen=True)
+class Glow:
+    """What a glTF material emits: factor times strength, its image's name and index, if any, and from which sides."""
+
+    factor: tuple[float, ...] = (0.0, 0.0, 0.0)
+    image: str | None = None
+    source: int | None = None
+    both_sides: bool = False
+
+
+@dataclass(frozen=True)
 class GltfFile:
     """A glTF file prepared for trimesh: `text` (JSON) and `assets`; trimesh's material "3" is materials[3] here."""
 
     text: bytes
     assets: Assets
     materials: tuple[BaseColor, ...]
+    glows: tuple[Glow, ...]
     notes: tuple[str, ...]
 
 
@@ -64,7 +76,7 @@ class GltfFormat(ModelFormat):
         file = read(path, data, root)
         super().__init__(path, file.text, "gltf", file.assets)
         self.notes += file.notes
-        self._materials = file.materials
+        self._materials, self._glows = file.materials, file.glows
 
     def read_reflectance(self, material: Any, colored: bool) -> Reflectance:
         """Return the base colour of the file's material, whose index is the name of trimesh's."""
@@ -75,6 +87,18 @@ class GltfFormat(ModelFormat):
         if base.image is not None and image is None:
             raise SceneError(f"{where}: image {base.image} is missing or not readable; put it next to the model")
         return Reflectance(base.name, check_albedo(base.factor, where, self.notes), image, base.image or "")
+
+    def read_emission(self, material: Any) -> Emission:
+        """Return what the file's material emits: without doubleSided, from the front of its faces."""
+        if material is None:
+            return Emission()
+        glow, base = self._glows[int(material.name)], self._materials[int(material.name)]
+        where, image = f"{self.path}: material {base.name}", material.emissiveTexture
+        if glow.image is None:
+            image = None
+        elif image is None:
+            raise SceneError(f"{where}: image {glow.image} is missing or not readable; put it next to the model")
+        return Emission(check_emission(glow.factor, where), image, glow.image or "", glow.both_sides)
 
     def decode_colors(self, values: Array) -> Array:
         """Return stored colours, which are linear, cut to 1."""
@@ -91,7 +115,7 @@ def read(path: Path, data: bytes, root: Path | None = None) -> GltfFile:
             raise ValueError("not a JSON object")
         notes = tuple(f"{path.name}: {note}" for note in _find_notes(document))
         _refuse(document)
-        materials = _prepare(document)
+        materials, glows = _prepare(document)
         buffers = _read_buffers(document, binary, assets)
         gltf_checks.check(document, buffers)
         for index, buffer in enumerate(buffers):
@@ -105,7 +129,7 @@ def read(path: Path, data: bytes, root: Path | None = None) -> GltfFile:
         # Any of these is what a value of an unexpected kind somewhere in the JSON ends in.
         what = " ".join(f"{type(error).__name__}: {error}".split())
         raise SceneError(f"{path}: malformed glTF ({what}); export it again") from error
-    return GltfFile(json.dumps(document).encode(), assets, materials, notes)
+    return GltfFile(json.dumps(document).encode(), assets, materials, glows, notes)
 
 
 def _read_buffers(document: Json, binary: bytes | None, assets: Assets) -> list[bytes]:
@@ -181,8 +205,6 @@ def _find_notes(document: Json) -> Iterator[str]:
     if lights or document.get("cameras"):
         yield "its lights and cameras are ignored"
     materials = document.get("materials", [])
-    if any(any(material.get("emissiveFactor", [])) for material in materials):
-        yield "emission is ignored"
     if any(material.get("alphaMode", "OPAQUE") != "OPAQUE" for material in materials):
         yield "transparency is ignored"
     bases = [_find_base(material) for material in materials]
@@ -213,8 +235,8 @@ def _find_base(material: Json) -> Json:
     return base
 
 
-def _prepare(document: Json) -> tuple[BaseColor, ...]:
-    """Change `document` into what trimesh reads right. Returns its materials."""
+def _prepare(document: Json) -> tuple[tuple[BaseColor, ...], tuple[Glow, ...]]:
+    """Change `document` into what trimesh reads right. Returns the base colours and the emission of its materials."""
     materials = document.setdefault("materials", [])
     bare = [primitive for primitive in _iterate_primitives(document) if "material" not in primitive]
     if bare:
@@ -222,14 +244,16 @@ def _prepare(document: Json) -> tuple[BaseColor, ...]:
     for primitive in bare:
         primitive["material"] = len(materials) - 1
     colors = [_read_base_color(document, material, index) for index, material in enumerate(materials)]
-    wanted = {color.source for color in colors}
+    glows = [_read_glow(document, material) for material in materials]
+    wanted = {color.source for color in colors} | {glow.source for glow in glows}
     for index in range(len(document.get("images", []))):
         if index not in wanted:
             document["images"][index] = {}  # trimesh need not read images that nobody uses
     for index, material in enumerate(materials):
         base = _find_base(material)
         reduced = {"baseColorTexture": base["baseColorTexture"]} if "baseColorTexture" in base else {}
-        materials[index] = {"name": str(index), "pbrMetallicRoughness": reduced}
+        lit = {"emissiveTexture": material["emissiveTexture"]} if glows[index].image is not None else {}
+        materials[index] = {"name": str(index), "pbrMetallicRoughness": reduced, **lit}
     for node in document.get("nodes", []):
         node.pop("camera", None)
     if "scenes" not in document:
@@ -237,7 +261,7 @@ def _prepare(document: Json) -> tuple[BaseColor, ...]:
         children = {child for node in nodes for child in node.get("children", [])}
         document["scenes"] = [{"nodes": [index for index in range(len(nodes)) if index not in children]}]
         document.pop("scene", None)
-    return tuple(colors)
+    return tuple(colors), tuple(glows)
 
 
 def _read_base_color(document: Json, material: Json, index: int) -> BaseColor:
@@ -248,10 +272,25 @@ def _read_base_color(document: Json, material: Json, index: int) -> BaseColor:
     name = str(material.get("name", index))
     if "baseColorTexture" not in base:
         return BaseColor(name, factor[:3])
-    number = base["baseColorTexture"]["index"]
+    return BaseColor(name, factor[:3], *_find_image(document, base["baseColorTexture"]["index"]))
+
+
+def _read_glow(document: Json, material: Json) -> Glow:
+    strength = float(material.get("extensions", {}).get(STRENGTH, {}).get("emissiveStrength", 1.0))
+    factor = tuple(float(value) * strength for value in material.get("emissiveFactor", (0.0, 0.0, 0.0)))
+    if len(factor) != 3:
+        raise ValueError("emissiveFactor has not three numbers")
+    sides = bool(material.get("doubleSided", False))
+    if not any(factor) or "emissiveTexture" not in material:
+        return Glow(factor, both_sides=sides)
+    return Glow(factor, *_find_image(document, material["emissiveTexture"]["index"]), both_sides=sides)
+
+
+def _find_image(document: Json, number: int) -> tuple[str, int | None]:
+    """Return the name and the index of a texture's image; None for one that no texture of its kind has."""
     texture = document["textures"][number]
     source = texture.get("extensions", {}).get("EXT_texture_webp", texture).get("source")
     if source is None:
-        return BaseColor(name, factor[:3], f"of texture {number}")
+        return f"of texture {number}", None
     uri = str(document["images"][source].get("uri", "data:"))
-    return BaseColor(name, factor[:3], f"number {source}" if uri.startswith("data:") else uri, source)
+    return (f"number {source}" if uri.startswith("data:") else uri), source

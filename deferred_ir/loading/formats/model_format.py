@@ -26,6 +26,15 @@ class Reflectance(NamedTuple):
     image_name: str = ""
 
 
+class Emission(NamedTuple):
+    """What a material emits: radiance (linear RGB), its PIL image or None, the image's name, and from which sides."""
+
+    radiance: Vec3 = (0.0, 0.0, 0.0)
+    image: Any = None
+    image_name: str = ""
+    both_sides: bool = False
+
+
 class ModelFormat(ABC):
     """One model file in one format: what trimesh is given, and how to read the appearance of what it returns.
 
@@ -45,6 +54,11 @@ class ModelFormat(ABC):
 
         Raises SceneError where an image that the file names is missing or broken.
         """
+
+    def read_emission(self, material: Any) -> Emission:
+        """Read what a material of trimesh, None for a mesh without one, emits. Raises SceneError as above."""
+        del material
+        return Emission()
 
     def read_colors(self, mesh: Any) -> Array | None:
         """Read linear colours of a mesh's vertices, else of its faces, float64 (n, 3); None if it has none."""

@@ -6,6 +6,7 @@ skips missing materials and images without a word, and rounds Kd to 8 bits.
 
 from __future__ import annotations
 
+import io
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,8 +14,8 @@ from typing import Any
 
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading.asset_paths import Assets, strip_options
-from deferred_ir.loading.formats.model_format import ModelFormat, Reflectance, choose_plain_albedo
-from deferred_ir.loading.model_data import check_albedo
+from deferred_ir.loading.formats.model_format import WHITE, Emission, ModelFormat, Reflectance, choose_plain_albedo
+from deferred_ir.loading.model_data import check_albedo, check_emission
 
 MATERIALS = "materials.mtl"
 """Name under which all materials of a model are handed to trimesh."""
@@ -22,11 +23,12 @@ MATERIALS = "materials.mtl"
 
 @dataclass(frozen=True)
 class MtlMaterial:
-    """An MTL material: the numbers of Kd (unrounded, none if it has none), its image, and whether it emits."""
+    """An MTL material: the numbers of Kd and Ke (unrounded, none if it has none), and their images."""
 
     kd: tuple[float, ...] = ()
     image: str | None = None
-    emits: bool = False
+    ke: tuple[float, ...] = ()
+    glow: str | None = None
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class ObjFormat(ModelFormat):
         super().__init__(path, file.text, "obj", file.assets)
         self.notes += file.notes
         self._materials = file.materials
+        self._images: dict[str, Any] = {}
 
     def read_reflectance(self, material: Any, colored: bool) -> Reflectance:
         """Return Kd, unrounded, and map_Kd of the file's material of that name."""
@@ -59,10 +62,28 @@ class ObjFormat(ModelFormat):
         self.require_image(material, image, known.image)
         if material.name in self._materials and not known.kd and image is None:
             self.notes.append(f"{self.path.name}: material {material.name} has no Kd that can be read; it is grey")
-        if known.emits:
-            self.notes.append(f"{self.path.name}: emission (Ke) is ignored")
         albedo = check_albedo(known.kd, self.locate(material), self.notes) if known.kd else plain
         return Reflectance(material.name, albedo, image, known.image or f"texture of {material.name}")
+
+    def read_emission(self, material: Any) -> Emission:
+        """Return Ke, which both sides of a face emit, times map_Ke; an image alone counts as it is."""
+        known = self._materials.get(material.name) if material is not None else None
+        if known is None or not (known.ke or known.glow):
+            return Emission()
+        radiance = check_emission(known.ke or WHITE, self.locate(material))
+        if not any(radiance) or known.glow is None:
+            return Emission(radiance, both_sides=True)
+        return Emission(radiance, self._open_image(material, known.glow), known.glow, both_sides=True)
+
+    def _open_image(self, material: Any, name: str) -> Any:
+        from PIL import Image
+
+        if name not in self._images:
+            try:
+                self._images[name] = Image.open(io.BytesIO(self.assets[name]))
+            except (OSError, ValueError):  # FileNotFoundError is one, and so is what PIL does not know
+                self.require_image(material, None, name)
+        return self._images[name]
 
 
 def read(path: Path, data: bytes, root: Path | None = None) -> ObjFile:
@@ -126,7 +147,9 @@ def _read_materials(mtl: str) -> dict[str, MtlMaterial]:
         elif name and key == "map_kd" and value.strip():
             materials[name] = replace(materials[name], image=strip_options(value).strip())
         elif name and key == "ke":
-            materials[name] = replace(materials[name], emits=any(number > 0 for number in _parse_numbers(value)))
+            materials[name] = replace(materials[name], ke=_parse_numbers(value))
+        elif name and key == "map_ke" and value.strip():
+            materials[name] = replace(materials[name], glow=strip_options(value).strip())
     return materials
 
 

@@ -11,9 +11,19 @@ from hypothesis import strategies as st
 from small_scenes import GREY, Mesh, box, build, plane, room, textured
 
 from deferred_ir.base.errors import SettingError
-from deferred_ir.frame.facts import EMITS, SOFT, TRIANGLES, collect_facts
-from deferred_ir.graph.facts import Facts
+from deferred_ir.frame.facts import (
+    DIRECT_LIGHTS,
+    EMISSION,
+    EMITS,
+    ENVIRONMENT,
+    SAMPLED,
+    SOFT,
+    TRIANGLES,
+    VIEWS,
+    collect_facts,
+)
 from deferred_ir.loading.load import load
+from deferred_ir.profiling.light_scenes import SCENES
 from deferred_ir.scene.motion import LissajousMotion, ModelMotion
 from deferred_ir.scene.scene import Geometry
 
@@ -51,7 +61,14 @@ def test_bounds_and_diagonal_are_those_of_what_faces_use():
 
 def test_facts_say_whether_the_light_shines_and_how_many_triangles_there_are():
     scene = room()
-    assert collect_facts(scene) == Facts({EMITS: True, SOFT: False, TRIANGLES: 24})
+    facts = collect_facts(scene)
+    assert [facts[fact] for fact in (EMITS, SOFT, TRIANGLES, DIRECT_LIGHTS)] == [True, False, 24, 1]
+    assert [facts[fact] for fact in (VIEWS, SAMPLED, ENVIRONMENT, EMISSION)] == [(0,), False, None, False]
+    everything = collect_facts(SCENES["mixture"]())
+    assert everything[DIRECT_LIGHTS] == 4
+    assert len(everything[VIEWS]) == 1 + 6 + 1 + 1
+    assert everything[ENVIRONMENT] == (128, 64)
+    assert (everything[SAMPLED], everything[EMISSION]) == (True, True)
     dim, dark = (replace(scene, lights=(replace(scene.spotlight, emission=(0, 0, e)),)) for e in (1e-9, 0))
     assert dim.emits
     assert not dark.emits

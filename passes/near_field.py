@@ -66,7 +66,7 @@ class NearField(Pass):
     def unneeded(self, facts: Facts) -> str | None:
         """Leave the pass out where nothing is clamped or the light is off."""
         if not facts[EMITS]:
-            return "the spotlight emits nothing"
+            return "nothing shines"
         return None if facts[CLAMPED] else "nothing is clamped: vpl.clamp or vpl.count is 0"
 
     def depends(self) -> frozenset[str]:

@@ -27,7 +27,7 @@ void main() {
     }
     vec3 position = unproject(ndc, d);
     float seen = 0.0;
-    for (int i = 0; i < direct; ++i) seen += seen_from(light_view(lights[i]), position);
+    for (int i = 0; i < direct; ++i) seen += seen_from(light_view(lights[i], position), position);
     for (int i = 0; i < count; ++i) seen += seen_from(vpl_view(vpls[i]), position);
     radiance = vec4(seen);
 }

@@ -10,6 +10,7 @@ from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 from deferred_ir.gl.shaders import Program
+from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.passes.shadow_maps import ShadowMaps
@@ -42,7 +43,7 @@ class LimitLighting(Pass):
         ctx, vpls = io.gpu.ctx, io["vpls"]
         io["lights"].bind()
         io["views"].bind()
-        program = io.program("limit_lighting.frag")
+        program = io.program("limit_lighting.frag", defines={"MIXED": 0, "VIEWS_PER_LIGHT": 1})
         ctx.blend_func = ctx.ONE, ctx.ONE
         for start in range(0, max(len(vpls.records), 1), VPLS_PER_BLOCK):
             vpls.bind(start // VPLS_PER_BLOCK)
@@ -59,9 +60,9 @@ class LimitMaps(ShadowMaps):
     shaders. Layers of the atlas lie above one another, so that every texel comes out the same.
     """
 
-    def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
+    def outputs_for(self, facts: Facts, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Declare the atlas with its layers above one another."""
-        outputs = super().outputs(inputs)
+        outputs = super().outputs_for(facts, inputs)
         atlas = outputs["atlas"]
         assert isinstance(atlas.description, Texture)
         assert atlas.description.size

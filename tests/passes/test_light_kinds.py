@@ -69,15 +69,14 @@ def test_points_bring_the_light_that_they_stand_for(renderer, name):
     scene = SCENES[name]()
     tracer = Tracer(scene)
     truth = PathTracer(scene, tracer, bounces=0).estimate(SIZE, 64)
-    one = renderer(
-        SIZE, "mapped", set={"shadow_rays.visibility": "rays", "interleave.n": 1, "light_points.samples": 128}
-    )
-    found = np.mean([one.render(scene, vpls=0, seed=seed).radiance for seed in range(3)], axis=0)
+    one = renderer(SIZE, "deferred", set={"light_points.samples": 256})
+    found = np.mean([one.render(scene, vpls=0, seed=seed).radiance for seed in range(2)], axis=0)
     hit = truth.hit
     expected = truth.direct + truth.emission
-    assert found[hit].mean() == pytest.approx(expected[hit].mean(), rel=0.02)
-    assert rel_mse(found[hit], expected[hit]) < 0.03
-    np.testing.assert_allclose(found[~hit], expected[~hit], rtol=1e-4, atol=1e-6)
+    # Parallel maps cover the whole scene: within a texel of the walls they let in light from outside.
+    assert found[hit].mean() == pytest.approx(expected[hit].mean(), rel=0.03 if "sky" in name else 0.02)
+    assert rel_mse(found[hit], expected[hit]) < (0.06 if "sky" in name else 0.01)
+    np.testing.assert_allclose(found[~hit], expected[~hit], rtol=1e-3, atol=1e-6)
 
 
 def test_an_environment_turns_about_the_vertical(renderer):

@@ -161,6 +161,7 @@ def test_each_light_has_a_sub_pass_with_its_place(renderer):
         "projection": "perspective",
         "layer": 0,
         "tile": 0,
+        "corner": (0, 0),
         "size": 2048,
         "state": "dirty",
         "why": "no frame has drawn it yet",

@@ -136,4 +136,4 @@ def left_out(visibility, facts):
 def test_where_it_is_left_out_it_says_why():
     assert left_out("rays", {}) is None
     assert left_out("maps", {}) == "visibility is 'maps'"
-    assert left_out("rays", {EMITS: False}) == "the spotlight emits nothing"
+    assert left_out("rays", {EMITS: False}) == "nothing shines"

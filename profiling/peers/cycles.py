@@ -1,7 +1,7 @@
 """Blender's Cycles on the CPU, with its denoiser (Open Image Denoise), through the `bpy` wheel.
 
-Its light is the spotlight of docs/conventions.md: nodes give Cycles' point or disc light the same intensity. What
-differs is that a pixel is averaged over its area. One scene a process: Blender has one set of data.
+Its lights are ours: nodes give Cycles' lights the same intensity. What differs is that a pixel is averaged over its
+area. Not possible: two environments. One scene a process: Blender has one set of data.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def _set_up(view: Any, size: tuple[int, int], bounces: int) -> None:
     cycles.light_sampling_threshold = 0
     cycles.use_adaptive_sampling = False
     cycles.use_auto_tile = False
-    cycles.use_light_tree = False  # there is one light
+    cycles.use_light_tree = len(view.objects) > 3  # than the body, the camera and one light
     cycles.pixel_filter_type = "BOX"
     # This pattern, prefilter and quality had the least error x time on cornell at 256x256 and 4 spp.
     cycles.sampling_pattern = "BLUE_NOISE"

@@ -1,24 +1,21 @@
-"""Conversion of a scene to Blender's: one mesh, its materials, the camera, and the spotlight as nodes."""
+"""Conversion of a scene to Blender's: one mesh, its materials, and the camera; `cycles_lights` converts the lights."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.base.colour import srgb_table
-from deferred_ir.sampling.warps import build_basis
+from deferred_ir.profiling.peers.cycles_lights import convert_lights
+from deferred_ir.profiling.peers.cycles_nodes import Nodes, make_matrix
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.geometry import Geometry
-from deferred_ir.scene.lights.spotlight import Spotlight, one_minus_cos
 from deferred_ir.scene.materials import Material, Texture
 from deferred_ir.scene.scene import Scene
 
-POINT_POWER = 4 * np.pi
-"""Power in watts at which Blender's point light has 1 W/sr for each unit of its nodes' emission."""
-DISC_POWER = np.pi
-"""Power in watts at which Blender's disc light has the same along its axis."""
 FARTHEST = 10.0
 """Far plane, in distances from the camera to the farthest corner of the scene."""
 
@@ -29,13 +26,13 @@ def build(bpy: Any, scene: Scene) -> None:
     images = [_image(bpy, texture) for texture in scene.textures]
     mesh = _mesh(bpy, scene.geometry)
     for material in scene.materials:
-        image = None if material.texture is None else images[material.texture]
-        mesh.materials.append(_material(bpy, material, image, scene.geometry.colors is not None))
+        mesh.materials.append(_material(bpy, material, images, scene.geometry.colors is not None))
     body = bpy.data.objects.new("scene", mesh)
     # By default Blender lifts shadow rays off smooth surfaces, against visible facets.
     body.shadow_terminator_geometry_offset = body.shadow_terminator_shading_offset = 0
     link(body)
-    link(_light(bpy, scene.spotlight))
+    for light in convert_lights(bpy, scene):
+        link(light)
     camera = _camera(bpy, scene.camera, scene.geometry)
     link(camera)
     bpy.context.scene.camera = camera
@@ -89,55 +86,45 @@ def _image(bpy: Any, texture: Texture) -> Any:
     return image
 
 
-def _material(bpy: Any, material: Material, image: Any, colored: bool) -> Any:
-    """Build a diffuse material with reflectance = albedo * texture * vertex colour."""
+def _material(bpy: Any, material: Material, images: Sequence[Any], colored: bool) -> Any:
+    """Build a diffuse material with reflectance = albedo * texture * vertex colour, which may emit."""
     result = bpy.data.materials.new(material.name)
     result.use_nodes = True
-    nodes = _Nodes(result.node_tree)
+    nodes = Nodes(result.node_tree)
     diffuse = nodes.add("ShaderNodeBsdfDiffuse", Roughness=0.0)
-    reflectance = nodes.value(material.albedo)
-    if image is not None:
-        where = nodes.add("ShaderNodeUVMap")
-        where.uv_map = "uv"
-        lookup = nodes.add("ShaderNodeTexImage", Vector=where.outputs["UV"])
-        lookup.image, lookup.interpolation, lookup.extension = image, "Linear", "REPEAT"
-        reflectance = nodes.vector("MULTIPLY", reflectance, lookup.outputs["Color"])
+    reflectance = _textured(nodes, material.albedo, None if material.texture is None else images[material.texture])
     if colored:
         color = nodes.add("ShaderNodeAttribute")
         color.attribute_name = "tint"
         reflectance = nodes.vector("MULTIPLY", reflectance, color.outputs["Color"])
     nodes.join(reflectance, diffuse.inputs["Color"])
-    nodes.join(diffuse.outputs["BSDF"], nodes.add("ShaderNodeOutputMaterial").inputs["Surface"])
+    surface = diffuse.outputs["BSDF"]
+    if any(material.emission):
+        number = material.emission_texture
+        radiance = _textured(nodes, material.emission, None if number is None else images[number])
+        emission = nodes.add("ShaderNodeEmission", Color=radiance)
+        if not material.emits_both_sides:
+            behind = nodes.add("ShaderNodeNewGeometry").outputs["Backfacing"]
+            nodes.join(nodes.math(behind, -1.0, 1.0), emission.inputs["Strength"])
+        both = nodes.add("ShaderNodeAddShader")
+        nodes.join(surface, both.inputs[0])
+        nodes.join(emission.outputs["Emission"], both.inputs[1])
+        surface = both.outputs["Shader"]
+        result.cycles.emission_sampling = "FRONT_BACK" if material.emits_both_sides else "FRONT"
+    nodes.join(surface, nodes.add("ShaderNodeOutputMaterial").inputs["Surface"])
     return result
 
 
-def _light(bpy: Any, spotlight: Spotlight) -> Any:
-    """Build a point light or a disc. The nodes give the cone and a point's cosine; a disc has the cosine by itself."""
-    point = spotlight.radius == 0
-    light = bpy.data.lights.new("spotlight", "POINT" if point else "AREA")
-    if point:
-        light.energy, light.shadow_soft_size = POINT_POWER, 0
-    else:
-        light.energy, light.shape, light.size = DISC_POWER, "DISK", 2 * spotlight.radius
-    # A ray that meets the disc by chance would see it; ours pass.
-    light.cycles.use_multiple_importance_sampling = False
-    light.use_nodes = True
-    nodes = _Nodes(light.node_tree)
-    # w from the light; 1 - cos(theta) = |w - axis|^2 / 2 does not cancel for narrow cones.
-    leaving = nodes.add("ShaderNodeNewGeometry").outputs["Incoming"]
-    off_axis = nodes.vector("SUBTRACT", leaving, tuple(spotlight.axis))
-    squared = nodes.vector("DOT_PRODUCT", off_axis, off_axis)
-    shine = nodes.math(squared, -2 / one_minus_cos(spotlight.fov), 4.0, clamp=True)
-    if point:
-        shine = nodes.math(nodes.math(squared, -0.5, 1.0), shine, 0.0)
-    emission = nodes.add("ShaderNodeEmission", Strength=shine)
-    emission.inputs["Color"].default_value = (*spotlight.emission, 1)
-    nodes.join(emission.outputs["Emission"], nodes.add("ShaderNodeOutputLight").inputs["Surface"])
-    body = bpy.data.objects.new("spotlight", light)
-    right, up = build_basis(spotlight.axis)
-    body.matrix_world = _matrix(-right, up, -spotlight.axis, spotlight.position)
-    body.visible_camera = False
-    return body
+def _textured(nodes: Nodes, factor: Vec3, image: Any) -> Any:
+    """Return a colour times an image, if there is one, as a socket."""
+    constant = nodes.value(factor)
+    if image is None:
+        return constant
+    where = nodes.add("ShaderNodeUVMap")
+    where.uv_map = "uv"
+    lookup = nodes.add("ShaderNodeTexImage", Vector=where.outputs["UV"])
+    lookup.image, lookup.interpolation, lookup.extension = image, "Linear", "REPEAT"
+    return nodes.vector("MULTIPLY", constant, lookup.outputs["Color"])
 
 
 def _camera(bpy: Any, camera: Camera, geometry: Geometry) -> Any:
@@ -151,53 +138,5 @@ def _camera(bpy: Any, camera: Camera, geometry: Geometry) -> Any:
     lens.clip_end = FARTHEST * float(np.linalg.norm(farthest))
     body = bpy.data.objects.new("camera", lens)
     right, up, forward = camera.axes
-    body.matrix_world = _matrix(right, up, -forward, camera.position)
+    body.matrix_world = make_matrix(right, up, -forward, camera.position)
     return body
-
-
-def _matrix(x: Array, y: Array, z: Array, position: Vec3) -> list[list[float]]:
-    """Return the matrix to world space from axes and origin. Blender reads a list as columns."""
-    return [[*map(float, column), last] for column, last in ((x, 0.0), (y, 0.0), (z, 0.0), (position, 1.0))]
-
-
-class _Nodes:
-    """A node tree built bottom up. Inputs are constants or sockets of other nodes."""
-
-    def __init__(self, tree: Any) -> None:
-        self._tree = tree
-        tree.nodes.clear()
-
-    def add(self, kind: str, **inputs: Any) -> Any:
-        """Add a node with inputs by name."""
-        node = self._tree.nodes.new(kind)
-        for name, source in inputs.items():
-            self.join(source, node.inputs[name])
-        return node
-
-    def join(self, source: Any, socket: Any) -> None:
-        """Set an input to a constant, or link it."""
-        if isinstance(source, float | tuple):
-            socket.default_value = source
-        else:
-            self._tree.links.new(source, socket)
-
-    def value(self, color: Vec3) -> Any:
-        """Return a constant colour as a socket."""
-        node = self.add("ShaderNodeCombineXYZ", X=color[0], Y=color[1], Z=color[2])
-        return node.outputs[0]
-
-    def vector(self, operation: str, a: Any, b: Any) -> Any:
-        """Apply a vector operation to `a` and `b`."""
-        node = self._tree.nodes.new("ShaderNodeVectorMath")
-        node.operation = operation
-        self.join(a, node.inputs[0])
-        self.join(b, node.inputs[1])
-        return node.outputs["Value" if operation == "DOT_PRODUCT" else "Vector"]
-
-    def math(self, a: Any, factor: Any, summand: float, *, clamp: bool = False) -> Any:
-        """Compute a * factor + summand, clamped to [0, 1] on request."""
-        node = self._tree.nodes.new("ShaderNodeMath")
-        node.operation, node.use_clamp = "MULTIPLY_ADD", clamp
-        for source, socket in zip((a, factor, summand), node.inputs, strict=True):
-            self.join(source, socket)
-        return node.outputs["Value"]

@@ -4,7 +4,8 @@
 
 The scenes are those of light_scenes.py. Mitsuba's pixels are means over their area, so that ours are jittered here as
 well. Blocks of 8x8 pixels agree if their means differ by no more than three standard errors (of both) in each channel;
-the errors come from the spread over `--seeds` images with `--spp` paths a pixel in all.
+the errors come from the spread over `--seeds` images with `--spp` paths a pixel in all. Mitsuba's pattern of samples is
+darker by 0.1 % under the grey sky where an image has only 4 or 8 paths a pixel, and is not with 64.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ from deferred_ir.truth.reference import Reference, trace_reference
 
 WITHIN = 3.0
 """Standard errors."""
+ROUNDING = 1e-5
+"""What 32-bit numbers may differ by, as a fraction of the mean: a constant sky has no spread."""
 HEAD = "scene", "blocks within 3 standard errors", "mean, ours / Mitsuba", "standard error"
 GRAPH_HEAD = "relMSE", "mean", "relMSE of direct light"
 
@@ -69,7 +72,7 @@ def compare(ours: Sequence[Array], theirs: Sequence[Array]) -> Agreement:
     means = [images.mean(axis=(1, 2, 3)) for images in blocks]
     spread = sum(mean.var(ddof=1) / len(mean) / mean.mean() ** 2 for mean in means)
     return Agreement(
-        within=float((off <= WITHIN * np.sqrt(variance)).all(axis=-1).mean()),
+        within=float((off <= WITHIN * np.sqrt(variance) + ROUNDING * blocks[1].mean()).all(axis=-1).mean()),
         ratio=float(means[0].mean() / means[1].mean()),
         error=float(np.sqrt(spread)),
     )

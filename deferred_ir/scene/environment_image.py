@@ -173,16 +173,16 @@ def _average(values: Array, axis: int, *, wraps: bool) -> Array:
 
 
 def _reduce(values: Array, axis: int, most: int) -> Array:
-    """Return means of neighbours along `axis`, so many that no more than `most` are left."""
+    """Return means of `values`, taken as constant in cells of equal size, over no more than `most` cells along `axis`."""
     count = values.shape[axis]
     if count <= most:
         return values
-    each = -(-count // most)
-    while count % each:  # cells of equal size
-        each += 1
-    shape = (*values.shape[:axis], count // each, each, *values.shape[axis + 1 :])
-    means: Array = values.reshape(shape).mean(axis=axis + 1)
-    return means
+    values = np.moveaxis(values, axis, 0)
+    sums = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+    ends = np.arange(most + 1) * (count / most)
+    whole = np.minimum(ends.astype(np.int64), count - 1)
+    at_ends = sums[whole] + values[whole] * (ends - whole)[:, None]
+    return np.moveaxis(np.diff(at_ends, axis=0) * (most / count), 0, axis)
 
 
 def _search_rows(ends: Array, row: Ints, marks: Array) -> Ints:

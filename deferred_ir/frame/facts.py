@@ -20,9 +20,8 @@ ENVIRONMENT = Fact[tuple[int, int] | None](
     "environment",
     unknown=(1, 1),
     doc="Size of the image of light from all around; None without.",
-    needs=True,
 )
-EMISSION = Fact("emission", unknown=True, doc="Surfaces emit.", needs=True)
+EMISSION = Fact("emission", unknown=True, doc="Surfaces emit.")
 SOFTWARE = Fact("software", unknown=True, doc="OpenGL draws on the CPU.")
 
 
@@ -34,7 +33,7 @@ def collect_facts(scene: Scene, size: tuple[int, int] | None = None, *, software
             EMITS: scene.emits,
             SOFT: any(light.has_area for light in direct),
             DIRECT_LIGHTS: len(direct),
-            VIEWS: tuple(view.halvings for light in direct for view in light.list_views(scene.bounds)),
+            VIEWS: tuple(halvings for light in direct for halvings in light.view_halvings),
             SAMPLED: bool(scene.sampled_lights),
             ENVIRONMENT: scene.environment.size if scene.environment else None,
             EMISSION: scene.surface_light is not None,

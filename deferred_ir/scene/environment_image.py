@@ -173,7 +173,7 @@ def _average(values: Array, axis: int, *, wraps: bool) -> Array:
 
 
 def _reduce(values: Array, axis: int, most: int) -> Array:
-    """Return means of `values`, taken as constant in cells of equal size, over no more than `most` cells along `axis`."""
+    """Return means of `values`, constant in cells of equal size, over no more than `most` cells along `axis`."""
     count = values.shape[axis]
     if count <= most:
         return values

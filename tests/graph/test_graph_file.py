@@ -169,7 +169,15 @@ def test_false_cuts_wires_and_outputs_of_the_extended_graph(tmp_path):
     text = 'extends = "deferred"\n[outputs]\ndisplay = false\n[passes]\nshadow_maps = false\ntonemap = false\n'
     graph = load_graph(write(tmp_path, text + "lighting.inputs = { shadows = false, blockers = false }\n"))
     plan = compile(graph, list(graph.outputs))
-    assert [step.name for step in plan.steps] == ["lights", "light_points", "gbuffer", "vpl", "cull_lights", "lighting"]
+    assert [step.name for step in plan.steps] == [
+        "lights",
+        "light_points",
+        "environment",
+        "gbuffer",
+        "vpl",
+        "cull_lights",
+        "lighting",
+    ]
     assert plan.steps[-1].sources["shadows"] is None
 
 

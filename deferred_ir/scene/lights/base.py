@@ -118,7 +118,9 @@ class Light(Protocol):
 
 
 class DirectLight(Light, Protocol):
-    """A light that shaders evaluate."""
+    """A light that shaders evaluate. view_halvings: how often the edge of the map of each of its views is halved."""
+
+    view_halvings: ClassVar[tuple[int, ...]]
 
     def describe(self) -> Mapping[str, Any]:
         """Return its fields of a LIGHT record (frame/direct_lights.py) but for kind and views."""

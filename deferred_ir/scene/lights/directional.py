@@ -27,6 +27,7 @@ class Directional(PlacedLight):
     """
 
     kind: ClassVar[str] = "directional"
+    view_halvings: ClassVar[tuple[int, ...]] = (0,)
     position: Vec3
     look_at: Vec3
     irradiance: Vec3 = (1.0, 1.0, 1.0)

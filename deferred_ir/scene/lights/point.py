@@ -28,6 +28,7 @@ class Point(PlacedLight):
     """position: world space; intensity: W/sr, linear RGB; radius: of a ball of that intensity, for soft shadows."""
 
     kind: ClassVar[str] = "point"
+    view_halvings: ClassVar[tuple[int, ...]] = (1,) * 6
     position: Vec3
     intensity: Vec3 = (1.0, 1.0, 1.0)
     radius: float = 0.0
@@ -80,7 +81,7 @@ class Point(PlacedLight):
     def list_views(self, bounds: Bounds) -> tuple[LightView, ...]:
         """Return the faces of a cube about it."""
         del bounds
-        return tuple(LightView(self.position, face, FACE_FOV, halvings=1) for face in FACES)
+        return tuple(LightView(self.position, face, FACE_FOV, halvings=self.view_halvings[0]) for face in FACES)
 
     def outline(self, bounds: Bounds) -> Array:
         """Return a cross, and its ball."""

@@ -30,6 +30,7 @@ class Spot(PlacedLight):
     """
 
     kind: ClassVar[str] = "spot"
+    view_halvings: ClassVar[tuple[int, ...]] = (0,)
     position: Vec3
     look_at: Vec3
     fov: float = 90.0

@@ -24,6 +24,7 @@ class Spotlight(PlacedLight):
     """position, look_at: world space; fov: full opening angle, degrees; emission: E, linear RGB; radius: of a disc."""
 
     kind: ClassVar[str] = "spotlight"
+    view_halvings: ClassVar[tuple[int, ...]] = (0,)
     position: Vec3
     look_at: Vec3
     fov: float = 80.0

@@ -13,7 +13,7 @@ import numpy as np
 from deferred_ir.base.arrays import Ints
 from deferred_ir.base.versions import new_versions
 from deferred_ir.graph.ports import Buffer, Output, Texture
-from deferred_ir.scene.lights.base import LightView, is_direct
+from deferred_ir.scene.lights.base import DirectLight, LightView, is_direct
 from deferred_ir.scene.lights.kinds import find_kinds
 from deferred_ir.scene.scene import Scene
 from deferred_ir.vpls.stale_maps import ModelMoves
@@ -80,9 +80,15 @@ class DescribedViews:
     rows: Ints
 
 
+def has_maps(light: DirectLight, lights: Sequence[DirectLight]) -> bool:
+    """Return whether one of the direct `lights` gets shadow maps: not if it is off beside others."""
+    return len(lights) == 1 or any(light.emission)
+
+
 def describe_views(scene: Scene) -> DescribedViews:
     """Return the views of the scene's direct lights."""
-    by_light = [light.list_views(scene.bounds) for light in scene.direct_lights]
+    lights = scene.direct_lights
+    by_light = [light.list_views(scene.bounds) if has_maps(light, lights) else () for light in lights]
     owners: Ints = np.repeat(np.arange(len(by_light)), [len(views) for views in by_light])
     block = owners // LIGHTS_PER_BLOCK
     first = np.searchsorted(block, block)  # of the views of its block

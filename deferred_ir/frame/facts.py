@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from deferred_ir.frame.direct_lights import has_maps
 from deferred_ir.graph.facts import Fact, Facts
 from deferred_ir.scene.scene import Scene
 
@@ -33,7 +34,7 @@ def collect_facts(scene: Scene, size: tuple[int, int] | None = None, *, software
             EMITS: scene.emits,
             SOFT: any(light.has_area for light in direct),
             DIRECT_LIGHTS: len(direct),
-            VIEWS: tuple(halvings for light in direct for halvings in light.view_halvings),
+            VIEWS: tuple(x for light in direct if has_maps(light, direct) for x in light.view_halvings),
             SAMPLED: bool(scene.sampled_lights),
             ENVIRONMENT: scene.environment.size if scene.environment else None,
             EMISSION: scene.surface_light is not None,

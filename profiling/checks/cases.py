@@ -7,6 +7,7 @@ from functools import partial
 from math import pi
 
 from deferred_ir.graph.file import find_obstacles
+from deferred_ir.profiling.checks import change_lights as lights
 from deferred_ir.profiling.checks import change_surfaces as surface
 from deferred_ir.profiling.checks import change_triangles as shape
 from deferred_ir.profiling.checks import change_views as change
@@ -98,6 +99,38 @@ LIGHT = (
         vpls=8,
     ),
 )
+KINDS = (
+    Case("sun 1e5 times as bright as the sky", lights.put_sun_and_sky, slack=OTHER),
+    Case("environment of one bright texel", lights.put_texel, slack=OTHER),
+    Case("point inside a wall", partial(lights.put_in_wall, area=False), "black"),
+    Case("sphere inside a wall", partial(lights.put_in_wall, area=True), "black"),
+    Case("point 1e-05 diagonals from a wall", partial(lights.put_on_wall, area=False), slack=OTHER),
+    Case("disc on a wall", partial(lights.put_on_wall, area=True), slack=OTHER),
+    Case("rectangle seen edge-on", lights.put_edge_on, slack=OTHER),
+    *(
+        Case(f"disc {width:g} diagonals wide", partial(lights.put_disc, width=width), slack=OTHER)
+        for width in (1e-3, 1.0)
+    ),
+    Case(
+        "1,000 points of which one shines",
+        partial(lights.put_points, dark=999),
+        "itself",
+        expected=partial(lights.put_points, dark=0),
+        bound=ROUNDED,
+    ),
+    *(
+        Case(
+            f"all kinds times {factor:g}",
+            partial(lights.mix, factor=factor),
+            "itself",
+            expected=lights.mix,
+            bound=ROUNDED,
+            gain=factor,
+        )
+        for factor in (1e-20, 1e20)
+    ),
+    Case("all kinds", lights.mix, slack=OTHER),
+)
 TRIANGLES = (
     Case("two walls closer than a texel", partial(shape.add_thin_walls, apart=1e-4), slack=SAME),
     Case("slivers of 1e-6", partial(shape.split_faces, fraction=1e-6), "itself", bound=MOVED),
@@ -155,7 +188,7 @@ SIZES = (
 )
 
 
-NAMED = {case.name: case for case in (*SCALE, *AWAY, *CAMERA, *LIGHT, *TRIANGLES, *SURFACES, *SIZES)}
+NAMED = {case.name: case for case in (*SCALE, *AWAY, *CAMERA, *LIGHT, *KINDS, *TRIANGLES, *SURFACES, *SIZES)}
 
 
 def _repeat(graph: str, *names: str) -> tuple[Case, ...]:

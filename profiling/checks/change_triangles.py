@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints, Vec3
-from deferred_ir.profiling.checks.change_views import find_wall, perpendicular, vec3, with_light
+from deferred_ir.profiling.checks.change_views import find_aim, find_light, find_wall, perpendicular, vec3, with_light
 from deferred_ir.scene.geometry import Geometry
 from deferred_ir.scene.scene import Scene
 
@@ -55,7 +55,8 @@ def make_box(centre: Vec3, half: float) -> tuple[Array, Ints]:
 
 def put_light_in_box(scene: Scene, half: float) -> Scene:
     """Close a box around the light. half: half of its edge, in diagonals."""
-    return add_triangles(scene, *make_box(scene.spotlight.position, half * scene.geometry.diagonal))
+    lit = with_light(scene)
+    return add_triangles(lit, *make_box(find_light(lit).position, half * scene.geometry.diagonal))
 
 
 def put_all_in_box(scene: Scene, half: float) -> Scene:
@@ -140,9 +141,10 @@ def add_large_triangle(scene: Scene, times: float, tilt: float) -> Scene:
 
 def add_thin_walls(scene: Scene, apart: float) -> Scene:
     """Add two squares across the light's path, `apart` diagonals from each other."""
-    light, diagonal = scene.spotlight, scene.geometry.diagonal
-    at, _ = find_wall(scene, light.position, light.axis)
-    middle, right = (np.asarray(light.position) + at) / 2, np.array(perpendicular(light.axis))
+    light, diagonal = find_light(scene), scene.geometry.diagonal
+    aim = find_aim(scene, light)
+    at, _ = find_wall(scene, light.position, aim)
+    middle, right = (np.asarray(light.position) + at) / 2, np.array(perpendicular(aim))
     half = 0.05 * diagonal
-    behind = middle + apart * diagonal * light.axis
-    return add_squares(scene, middle, behind, right=half * right, up=half * np.cross(light.axis, right))
+    behind = middle + apart * diagonal * aim
+    return add_squares(scene, middle, behind, right=half * right, up=half * np.cross(aim, right))

@@ -1,8 +1,9 @@
-"""Changes of a scene's units, camera and light for the extreme cases. Each takes a scene and returns another."""
+"""Changes of a scene's units, camera and lights for the extreme cases. Each takes a scene and returns another."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,9 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.base import Light
+from deferred_ir.scene.lights.environment import Environment
+from deferred_ir.scene.lights.fields import COLOURS
 from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
 
@@ -36,43 +40,91 @@ def vec3(values: Any) -> Vec3:
     return x, y, z
 
 
+class Unsuited(Exception):  # noqa: N818 - no error: a scene may lack what a case changes
+    """A scene lacks what a case changes; says what."""
+
+
 def scale(scene: Scene, factor: float) -> Scene:
-    """Change the units, and E so that the image stays the same."""
-    camera, light = scene.camera, scene.spotlight
+    """Change the units, and intensities with them, so that the image stays the same."""
+    camera = scene.camera
 
     def point(place: Vec3) -> Vec3:
         return vec3(np.multiply(place, factor))
 
+    lengths = {"position": factor, "look_at": factor, "radius": factor, "size": factor}
+    powers = {"emission": factor**2, "intensity": factor**2}
     return replace(
         scene,
         geometry=replace(scene.geometry, positions=scene.geometry.positions * factor),
         camera=replace(camera, position=point(camera.position), look_at=point(camera.look_at)),
-        lights=(
-            replace(
-                light,
-                position=point(light.position),
-                look_at=point(light.look_at),
-                radius=light.radius * factor,
-                emission=vec3(np.multiply(light.emission, factor**2)),
-            ),
-        ),
+        lights=tuple(_multiply(light, lengths | powers) for light in scene.lights),
     )
+
+
+def _multiply(light: Any, factors: Mapping[str, float]) -> Any:
+    """Multiply those fields of a light that it has."""
+    own = {field.name for field in fields(light)}
+    found = {
+        name: np.multiply(getattr(light, name), factor).tolist() for name, factor in factors.items() if name in own
+    }
+    return replace(light, **found)
 
 
 def shift(scene: Scene, by: Vec3) -> Scene:
     """Translate the whole scene."""
     geometry = replace(scene.geometry, positions=scene.geometry.positions + by)
-    return replace(scene, geometry=geometry, camera=scene.camera.translate(by), lights=(scene.spotlight.translate(by),))
+    lights = tuple(light.translate(by) for light in scene.lights)
+    return replace(scene, geometry=geometry, camera=scene.camera.translate(by), lights=lights)
 
 
 def brighten(scene: Scene, factor: float) -> Scene:
-    """Multiply E by `factor`."""
-    return with_light(scene, emission=vec3(np.multiply(scene.spotlight.emission, factor)))
+    """Multiply all light by `factor`."""
+    lights = tuple(_brighten_light(light, factor) for light in scene.lights)
+    return replace(_light_surfaces(scene, factor), lights=lights)
+
+
+def _brighten_light(light: Any, factor: float) -> Any:
+    if isinstance(light, Environment):
+        return replace(light, scale=light.scale * factor)
+    return _multiply(light, dict.fromkeys(COLOURS, factor))
+
+
+def _light_surfaces(scene: Scene, factor: float) -> Scene:
+    """Multiply what surfaces emit by `factor`."""
+    if scene.surface_light is None:
+        return scene
+    materials = tuple(replace(each, emission=vec3(np.multiply(each.emission, factor))) for each in scene.materials)
+    return replace(scene, materials=materials)
+
+
+def shine_alone(scene: Scene, *lights: Light) -> Scene:
+    """Replace all that shines by `lights`."""
+    return replace(_light_surfaces(scene, 0.0), lights=lights)
+
+
+def find_light(scene: Scene) -> Any:
+    """Return the first light whose maps look from a place. Raises Unsuited if there is none."""
+    for light in scene.direct_lights:
+        if any(view.fov for view in light.list_views(scene.bounds)):
+            return light
+    raise Unsuited("no light shines from a point")
+
+
+def find_aim(scene: Scene, light: Any) -> Array:
+    """Return the unit direction in which a light looks; that of the camera if it shines all around."""
+    axis: Array = light.axis if hasattr(light, "axis") else scene.camera.axes[2]
+    return axis
 
 
 def with_light(scene: Scene, **keys: Any) -> Scene:
-    """Change values of the spotlight."""
-    return replace(scene, lights=(replace(scene.spotlight, **keys),))
+    """Change values of the light that `find_light` finds, and leave no other. Raises Unsuited if it has no cone."""
+    light = find_light(scene)
+    own = {field.name for field in fields(light)}
+    if "fov" in keys and "fov" not in own:
+        raise Unsuited("no light has a cone")
+    if keys.get("fov", np.inf) < getattr(light, "inner_fov", 0.0):
+        keys["inner_fov"] = 0.0
+    return shine_alone(scene, replace(light, **{name: value for name, value in keys.items() if name in own}))
 
 
 def tilt_up(scene: Scene, angle: float) -> Scene:
@@ -107,8 +159,8 @@ def put_camera_at_wall(scene: Scene, fraction: float, along: bool = False) -> Sc
 
 def put_light_at_wall(scene: Scene, fraction: float, grazing: bool = False) -> Scene:
     """Put the light `fraction` diagonals off the surface it lit, shining away from it or, with `grazing`, along it."""
-    light = scene.spotlight
-    at, normal = find_wall(scene, light.position, light.axis)
+    light = find_light(scene)
+    at, normal = find_wall(scene, light.position, find_aim(scene, light))
     place = at + normal * fraction * scene.geometry.diagonal
     aim = np.array(perpendicular(normal)) + 0.01 * normal if grazing else normal
     return with_light(scene, position=vec3(place), look_at=vec3(place + aim * scene.geometry.diagonal))
@@ -131,7 +183,8 @@ def put_light_in_corner(scene: Scene) -> Scene:
 
 def put_camera_at_light(scene: Scene) -> Scene:
     """Put the camera just beside the light with its direction: everything visible is lit."""
-    light, diagonal = scene.spotlight, scene.geometry.diagonal
-    place = np.asarray(light.position) + 1e-7 * diagonal * np.asarray(perpendicular(light.axis))
-    camera = Camera(vec3(place), vec3(place + light.axis * diagonal), perpendicular(light.axis), min(light.fov, 120.0))
+    light, diagonal = find_light(scene), scene.geometry.diagonal
+    aim, fov = find_aim(scene, light), min(getattr(light, "fov", 120.0), 120.0)
+    place = np.asarray(light.position) + 1e-7 * diagonal * np.asarray(perpendicular(aim))
+    camera = Camera(vec3(place), vec3(place + aim * diagonal), perpendicular(aim), fov)
     return replace(scene, camera=camera)

@@ -18,7 +18,8 @@ import numpy as np
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import Error
 from deferred_ir.engine.renderer import Renderer
-from deferred_ir.profiling.checks.change_views import freeze, same
+from deferred_ir.profiling.checks.change_views import Unsuited, freeze, same
+from deferred_ir.profiling.checks.trace_points import trace_with_points
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.reference import SETTINGS, Reference, trace_reference
 
@@ -58,7 +59,10 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """The result of a case in a scene. figure: None after an error, which `note` describes."""
+    """The result of a case in a scene. figure: None after an error, which `note` describes.
+
+    left_out: the scene lacks what the case changes, as `note` says.
+    """
 
     scene: str
     case: str
@@ -67,11 +71,12 @@ class Row:
     figure: float | None
     bound: float
     note: str = ""
+    left_out: bool = False
 
     @property
     def holds(self) -> bool:
-        """Whether the figure is within its bound; neither may be infinite or NaN."""
-        return self.figure is not None and self.figure <= self.bound < inf
+        """Whether the figure is within its bound, where there is one; neither may be infinite or NaN."""
+        return self.left_out or (self.figure is not None and self.figure <= self.bound < inf)
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data for JSON, which has no infinity."""
@@ -96,14 +101,16 @@ class Judge:
             self._scene, self._usual = scene, {}
         for case in cases:
             figure: float | None = None
-            bound, note = case.bound, ""
+            bound, note, left_out = case.bound, "", False
             try:
                 if case.against == "rays":
                     bound = max(case.slack * self.usual_error(scene, case.graph), HALF_FLOAT)
                 figure = self._figure(scene, case)
+            except Unsuited as reason:
+                note, left_out = str(reason), True
             except Error as error:
                 note = str(error)
-            yield Row(scene.name, case.name, case.graph, case.against, figure, bound, note)
+            yield Row(scene.name, case.name, case.graph, case.against, figure, bound, note, left_out)
 
     def usual_error(self, scene: Scene, graph: str = "deferred") -> float:
         """Return the fraction of direct or indirect light, the larger, that maps get wrong in the unchanged scene."""
@@ -113,7 +120,7 @@ class Judge:
             alone_free, free = self._render_unshadowed(scene, direct), self._render_unshadowed(scene, whole)
             traced = self._trace(scene, whole)
             self._usual[graph] = max(
-                _ratio(np.abs(alone - traced.direct).sum(), alone_free.sum()),
+                _ratio(np.abs(alone - traced.direct - traced.emission).sum(), (alone_free - traced.emission).sum()),
                 _ratio(np.abs(lit - alone - traced.indirect).sum(), (free - alone_free).sum()),
             )
         return self._usual[graph]
@@ -131,7 +138,8 @@ class Judge:
         unshadowed = self._render_unshadowed(changed, case)
         if case.against == "unshadowed":
             return _ratio(np.maximum(image - unshadowed, 0).sum(), unshadowed.sum())
-        return _ratio(np.abs(image - self._trace(changed, case).radiance).sum(), unshadowed.sum())
+        traced = self._trace(changed, case)
+        return _ratio(np.abs(image - traced.radiance).sum(), (unshadowed - traced.emission).sum())
 
     def _render_expected(self, scene: Scene, case: Case) -> Array:
         """Render the image that the case must equal."""
@@ -141,10 +149,14 @@ class Judge:
         return image[top : top + case.size[1], left : left + case.size[0]]
 
     def _trace(self, scene: Scene, case: Case) -> Reference:
-        """Sum the same VPLs with visibility by rays."""
+        """Sum the same VPLs, and the same points of lights, with visibility by rays."""
         bounces = case.settings.get("vpl.bounces", 1) if case.vpls else 0
         settings = {name: value for name, value in self._values(case).items() if name in SETTINGS}
-        return trace_reference(scene, case.size, vpls=max(case.vpls, 1), bounces=bounces, settings=settings)
+        count = max(case.vpls, 1)
+        if scene.sampled_lights:
+            samples = self._renderer(case.graph).graph().nodes["light_points"].work.params.samples
+            return trace_with_points(scene, case.size, vpls=count, bounces=bounces, settings=settings, samples=samples)
+        return trace_reference(scene, case.size, vpls=count, bounces=bounces, settings=settings)
 
     def _render_unshadowed(self, scene: Scene, case: Case) -> Array:
         """Render with the same lights and without shadows."""
@@ -197,8 +209,9 @@ def heading(width: int) -> str:
 
 def line(row: Row, width: int) -> str:
     """Return a line of the table."""
-    figure = "error" if row.figure is None else f"{row.figure:.1e}"
-    verdict = "holds" if row.holds else "FAILS"
+    missing = "-" if row.left_out else "error"
+    figure = missing if row.figure is None else f"{row.figure:.1e}"
+    verdict = "left out" if row.left_out else "holds" if row.holds else "FAILS"
     text = (
         f"{row.scene:<{width}}  {row.case:<44}  {row.graph:<11}  {row.against:<10}  "
         f"{figure:>7}  {row.bound:>7.1e}  {verdict}"

@@ -9,6 +9,9 @@ import pytest
 from fixed_lights import lit_by, vpl_records
 from small_scenes import box, build, room
 
+from deferred_ir.profiling.checks import cases, change_views
+from deferred_ir.profiling.checks.extremes import Judge
+from deferred_ir.profiling.light_scenes import SCENES
 from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.recentre import recentre_geometry
 from deferred_ir.scene.scene import Scene
@@ -143,3 +146,39 @@ def test_exposure_makes_up_for_any_brightness(renderer, factor: float) -> None:
     plain, found = one.render(scene), one.render(other)
     np.testing.assert_allclose(found.radiance / factor, plain.radiance, rtol=1e-5, atol=1e-9)
     assert np.abs(found.display.astype(int) - plain.display).max() <= 1
+
+
+@pytest.fixture(scope="module")
+def judge():
+    with Judge("software") as made:
+        yield made
+
+
+@pytest.mark.parametrize("case", cases.KINDS, ids=lambda case: case.name)
+def test_lights_of_all_kinds_hold_at_their_extremes(judge, case) -> None:
+    small = replace(case, size=(64, 64), vpls=16)
+    (row,) = judge.rows(room(), [small])
+    assert row.holds, row
+
+
+@pytest.mark.parametrize("name", ["point", "directional", "rect", "grey sky", "panels"])
+def test_scenes_of_any_light_are_checked(judge, name: str) -> None:
+    """What is compared is right where it should be, and is not where a light is missing or wrong."""
+    chosen = ("scale 100, E by its square", "1000 units from the origin", "E times 1e+20", "3 VPLs")
+    scene = SCENES[name]()
+    for row in judge.rows(scene, [replace(cases.NAMED[case], size=(64, 64)) for case in chosen]):
+        assert row.holds
+        assert not row.left_out
+    wrong = replace(cases.NAMED["E times 1e+20"], gain=1.01e20, size=(64, 64))
+    brighter = replace(wrong, against="rays", change=change_views.same, slack=0.0, bound=0.0)
+    row, other = judge.rows(scene, [wrong, brighter])
+    assert not row.holds
+    assert other.figure is not None
+    assert other.figure < 0.05
+
+
+@pytest.mark.parametrize(("name", "why"), [("rect", "no light shines from a point"), ("point", "no light has a cone")])
+def test_cases_that_a_scene_has_no_light_for_are_left_out(judge, name: str, why: str) -> None:
+    (row,) = judge.rows(SCENES[name](), [cases.NAMED["spotlight's fov 179.9"]])
+    assert (row.left_out, row.figure, row.note, row.holds) == (True, None, why, True)
+    assert row.as_dict()["left_out"]

@@ -42,7 +42,7 @@ def read_lights(root: Table, folder: Path) -> tuple[Light, ...]:
         kind = entry.get("kind")
         if kind is None:
             root.fault(f"{name}.kind", f"missing; give one of {', '.join(kinds)}")
-        elif kind not in kinds:
+        elif not isinstance(kind, str) or kind not in kinds:
             hint = did_you_mean(kind, kinds) if isinstance(kind, str) else f"; known: {', '.join(kinds)}"
             root.fault(f"{name}.kind", f"unknown kind of light {format_value(kind)}{hint}")
         else:

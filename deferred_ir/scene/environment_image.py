@@ -128,8 +128,12 @@ def read_image(path: str | os.PathLike[str]) -> EnvironmentImage:
         raise SceneError(f"{file}: environment images are {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
     if not file.is_file():
         raise SceneError(f"{file}: no such file; give the environment's image")
+    is_png = file.suffix.lower() == ".png"
+    data = file.read_bytes() if is_png else b""
+    if data.startswith(b"\x89PNG") and b"IEND" not in data:  # of this libpng would print lines of its own
+        raise SceneError(f"{file}: broken (cut short); export it again")
     pixels = _decode(file)
-    if file.suffix.lower() == ".png":
+    if is_png:
         pixels = linear_from_srgb(pixels)
     return EnvironmentImage(pixels, str(file))
 

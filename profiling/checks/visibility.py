@@ -23,18 +23,20 @@ from deferred_ir.graph.file import graph_hash, load_graph
 from deferred_ir.graph.params import specs
 from deferred_ir.profiling.checks.visibility_pass import FOLDER, VisibilityPairs
 from deferred_ir.scene.camera import Camera
+from deferred_ir.scene.lights.base import DirectLight, end_outside
 from deferred_ir.scene.recentre import recentre
 from deferred_ir.scene.scene import Scene
+from deferred_ir.shadows.layout import lay_out
 from deferred_ir.shadows.settings import MapParams
 from deferred_ir.shadows.views import WIDEST_PLANAR
 
 GRAPH = FOLDER / "visibility.toml"
 PASSES = {"visibility_pairs": VisibilityPairs}
 SOURCES = {
-    "spotlight": ("spotlight_pairs", ("lights", "lights")),
+    "direct": ("spotlight_pairs", ("lights", "lights")),
     "vpls": ("vpl_pairs", ("vpl", "vpls")),
 }
-"""Which pass of the graph pairs pixels with lights of a kind, and where the records of these are."""
+"""By output of the graph: which pass pairs pixels with lights, and where the records of these are."""
 MAPS = "shadow_maps"
 VPL_SIZE = f"{MAPS}.vpl_size"
 LEAST_FRAMES = 8
@@ -68,7 +70,7 @@ class Fraction:
 
 @dataclass(frozen=True)
 class Row:
-    """The result for one kind of lights ("spotlight", "vpls") and maps of one projection and size (texels).
+    """The result for a kind of direct lights, or "vpls", and maps of one projection and size (texels).
 
     mismatch: pairs on which map and ray disagree, the sum of leaks (lit by the map, blocked for the ray) and
     false_shadows (the reverse). A map that says half or more counts as lit. light_wrong, light_leaked and light_lost:
@@ -102,24 +104,34 @@ class Row:
 
 @dataclass(frozen=True)
 class _Maps:
-    """A kind of maps to measure. lights: whose maps they are."""
+    """A kind of maps to measure. lights: whose maps they are. only: the light that is measured alone, None for VPLs."""
 
     lights: str
     projection: str
     size: int
+    only: DirectLight | None = None
+
+    def pick(self, scene: Scene) -> Scene:
+        """Return the scene with the light that is measured."""
+        return scene if self.only is None else replace(scene, lights=(self.only,))
 
 
 def rows(scene: Scene, options: Options, progress: Progress | None = None) -> Iterator[Row]:
-    """Yield a row for the spotlight with each projection, and for the VPLs with each projection and map size.
+    """Yield a row for the first direct light of each kind, and for the VPLs with each projection and map size.
 
-    Yields none if the spotlight emits nothing. Raises GraphError before the first row for settings that do not fit any.
+    Points of lights are among the VPLs. Yields none if nothing shines. Raises GraphError before the first row for
+    settings that do not fit any.
     """
     scene = recentre(scene)  # as the maps and Embree have it
     for settings, chosen in _choose_maps(scene, options):
         with Renderer(options.size, GRAPH, options.device, set=settings, passes=PASSES) as renderer:
             for maps in chosen:
                 yield _row(
-                    renderer, scene, options, maps, _measure_frames(renderer, scene, maps.lights, options, progress)
+                    renderer,
+                    scene,
+                    options,
+                    maps,
+                    _measure_frames(renderer, maps.pick(scene), maps.lights, options, progress),
                 )
 
 
@@ -128,21 +140,27 @@ def _choose_maps(scene: Scene, options: Options) -> list[tuple[dict[str, Any], l
     chosen, known = list[tuple[dict[str, Any], list[_Maps]]](), set[_Maps]()
     if not scene.emits:
         return chosen
-    wide = scene.spotlight.fov > WIDEST_PLANAR
+    direct = {light.kind: light for light in reversed(scene.direct_lights) if any(light.emission)}
     for choice in _projections(options.settings):
         for vpl_size in options.vpl_sizes:
             settings = {**options.settings, **choice, VPL_SIZE: vpl_size}
             graph = load_graph(GRAPH, settings, PASSES)
             steps = compile(graph, list(graph.outputs), collect_facts(scene)).steps
             step = next(step for step in steps if step.name == MAPS)
-            parts = step.work.subpasses(step.descriptions)  # the spotlight's, then those of VPLs
-            kinds = [
-                _Maps(lights, "paraboloid" if lights == "spotlight" and wide else part["projection"], part["size"])
-                for lights, part in zip(("spotlight", "vpls"), parts, strict=False)
-            ]
+            parts = [part for part in step.work.subpasses(step.descriptions) if part["light"] == "vpl 0"]
+            kinds = [_describe_maps(light, scene, step.work.params) for light in reversed(direct.values())]
+            kinds += [_Maps("vpls", part["projection"], part["size"]) for part in parts]
             chosen.append((settings, [maps for maps in kinds if maps not in known]))
             known |= set(kinds)
     return [(settings, maps) for settings, maps in chosen if maps]
+
+
+def _describe_maps(light: DirectLight, scene: Scene, params: Any) -> _Maps:
+    """Return what maps a light has where it is the only one."""
+    views = light.list_views(scene.bounds)
+    sizes = lay_out([view.halvings for view in views], params, max(params.spot_size, params.vpl_size)).sizes
+    wide = "paraboloid" if views[0].fov > WIDEST_PLANAR else "perspective"
+    return _Maps(light.kind, wide if views[0].fov else "orthographic", sizes[0], light)
 
 
 def _projections(settings: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -156,7 +174,7 @@ def _measure_frames(
     renderer: Renderer, scene: Scene, lights: str, options: Options, progress: Progress | None
 ) -> Array:
     """Draw frames until there are enough pairs. Returns the sums of each, (frames, 6), as in `Pairs.sums`."""
-    plan = renderer.plan(scene, outputs=[lights])
+    plan = renderer.plan(scene, outputs=[name_output(lights)])
     rng = np.random.default_rng(options.seed)
     sums: list[Array] = []
     done = 0
@@ -205,9 +223,17 @@ class Pairs:
         return np.array([len(lit), (shown & ~lit).sum(), (~shown & lit).sum(), self.irradiance.sum(), leaked, lost])
 
 
+def name_output(lights: str) -> str:
+    """Return the output of the graph that has the pairs with `lights`: a kind of direct lights, or "vpls"."""
+    return "vpls" if lights == "vpls" else "direct"
+
+
 def trace_pairs(renderer: Renderer, scene: Scene, lights: str) -> Pairs:
-    """Read the pairs of the last frame, of `scene` and `lights` ("spotlight", "vpls"), and trace a ray for each."""
-    source, records_of = SOURCES[lights]
+    """Read the pairs of the last frame, of `scene` and `lights`, and trace a ray for each.
+
+    lights: "vpls", or the kind of the scene's first direct light.
+    """
+    source, records_of = SOURCES[name_output(lights)]
     with renderer.gpu.ctx:
         pairs, facing = (renderer.executor.resource((source, port)).read()[::-1] for port in ("pairs", "facing"))
         records = renderer.executor.resource(records_of).records
@@ -217,8 +243,12 @@ def trace_pairs(renderer: Renderer, scene: Scene, lights: str) -> Pairs:
     position = np.asarray(scene.camera.position) + scene.camera.rays(renderer.size)[counts] * away[:, None]
     normal, light = facing[counts, :3].astype(np.float64), number.astype(int)
     target, tracer = records["position"][light].astype(np.float64), renderer.tracer()
-    if lights == "vpls":  # they lie on surfaces, unlike the spotlight
-        target = tracer.lift(target, records["z_axis"][light].astype(np.float64))
+    if lights == "vpls":  # they lie on surfaces, unlike direct lights
+        axis = records["z_axis"][light].astype(np.float64)
+        far = (records["tan_half"][light] == 0)[:, None]
+        target = np.where(far, end_outside(position, -axis, scene.bounds), tracer.lift(target, axis))
+    elif lights == "directional":
+        target = end_outside(position, -records["axis"][light].astype(np.float64), scene.bounds)
     lit = ~tracer.occluded(tracer.lift(position, normal), target)
     return Pairs(light, position, normal, shown, lit, irradiance)
 
@@ -266,7 +296,7 @@ WITH_ERROR = ("mismatch", "light_wrong")
 def heading(width: int) -> str:
     """Return the table's first line. width: of the longest scene's name."""
     fractions = [f"{name.replace('_', ' '):>{wide}}" for name, wide in FRACTIONS.items()]
-    return f"{'scene':<{width}}  lights     projection    map      pairs{''.join(fractions)}"
+    return f"{'scene':<{width}}  lights       projection    map      pairs{''.join(fractions)}"
 
 
 def line(row: Row, width: int) -> str:
@@ -274,7 +304,7 @@ def line(row: Row, width: int) -> str:
     fractions = [
         f"{_percent(getattr(row, name), error=name in WITH_ERROR):>{wide}}" for name, wide in FRACTIONS.items()
     ]
-    what = f"{row.scene:<{width}}  {row.lights:<9}  {row.projection:<11}"
+    what = f"{row.scene:<{width}}  {row.lights:<11}  {row.projection:<11}"
     return f"{what} {row.map_size:>5}  {row.pairs:>9,}{''.join(fractions)}"
 
 

@@ -26,11 +26,11 @@ FOLDER = Path(__file__).parent
 class Params(ShadowFilter):
     """Parameters of the pairs."""
 
-    lights_of: Literal["spotlight", "vpls"] = param("vpls", doc="Which lights pixels are paired with.")
+    lights_of: Literal["direct", "vpls"] = param("vpls", doc="Which lights pixels are paired with.")
 
 
 class VisibilityPairs(Pass):
-    """Pairs each pixel with the spotlight, or with a VPL chosen by a hash of pixel and seed."""
+    """Pairs each pixel with the first direct light, or with a VPL chosen by a hash of pixel and seed."""
 
     Params = Params
     shader_folder = FOLDER
@@ -54,7 +54,7 @@ class VisibilityPairs(Pass):
 
     def execute(self, frame: Frame, io: Io) -> None:
         """Draw one fullscreen triangle a block of VPLs; a pixel is drawn by the block with its light."""
-        vpls, direct = io["vpls"], self.params.lights_of == "spotlight"
+        vpls, direct = io["vpls"], self.params.lights_of == "direct"
         io.framebuffer.clear_color(0)
         io.framebuffer.clear_color(1)
         total = len(vpls.records)

@@ -118,7 +118,7 @@ def test_a_dark_light_is_told(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr("deferred_ir.loading.load.load", lambda _: dark)
     assert main(["check", "cornell", *ONE, "--json", str(tmp_path / "f.json")]) == 0
     output = capsys.readouterr()
-    assert output.err == "note: cornell: the spotlight emits nothing: no light that a map could be wrong about\n"
+    assert output.err == "note: cornell: nothing shines: no light that a map could be wrong about\n"
     assert json.loads((tmp_path / "f.json").read_text()) == {"visibility": []}
 
 

@@ -12,6 +12,7 @@ from small_scenes import build, plane, quad, room, scaled
 from deferred_ir.base.errors import GraphError
 from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
 from deferred_ir.graph.params import specs
+from deferred_ir.profiling.light_scenes import SCENES
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.scene import Scene
@@ -56,7 +57,7 @@ def frame(renderer):
     def draw(scene, lights="vpls", size=SIZE, seed=0, **settings):
         given = {"shadow_maps.spot_size": 256, "shadow_maps.vpl_size": 64} | settings
         one = renderer(size, visibility.GRAPH, set=given, passes=visibility.PASSES)
-        plan = one.plan(scene, outputs=[lights])
+        plan = one.plan(scene, outputs=[visibility.name_output(lights)])
         one.draw(scene, plan, seed=seed)
         return visibility.trace_pairs(one, scene, lights), one
 
@@ -256,3 +257,23 @@ def test_faults_show_before_the_first_row():
         next(visibility.rows(room(), options(sizes=(64, 3))))
     with pytest.raises(GraphError, match=r"64 VPLs of 4096x4096 need"):
         next(visibility.rows(room(), options(sizes=(64, 4096), **{"vpl.count": 64})))
+
+
+def test_each_kind_of_direct_light_has_a_row():
+    """Maps and rays mean the same light: few pairs differ, all at borders of shadows."""
+    found = {row.lights: row for row in visibility.rows(SCENES["mixture"](), options(pairs=8000))}
+    projections = {kind: row.projection for kind, row in found.items() if kind != "vpls"}
+    perspective = dict.fromkeys(("spotlight", "point", "spot"), "perspective")
+    assert projections == {**perspective, "directional": "orthographic"}
+    assert {kind: found[kind].map_size for kind in projections} == {
+        kind: 128 if kind == "point" else 256 for kind in projections
+    }
+    for row in found.values():
+        assert row.pairs > 1000
+        assert row.mismatch.value < 0.05
+
+
+def test_pairs_with_points_at_infinity_are_traced_there():
+    (row, *_) = visibility.rows(SCENES["grey sky"](), options(pairs=4000, sizes=(256,)))
+    assert row.lights == "vpls"
+    assert row.mismatch.value < 0.05

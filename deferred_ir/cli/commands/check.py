@@ -183,7 +183,7 @@ def _print_visibility(work: list[tuple[Scene, visibility.Options]]) -> list[visi
             for text in list_notes(scene):
                 bar.print(f"note: {text}", sys.stderr)
             if not scene.emits:
-                text = "the spotlight emits nothing: no light that a map could be wrong about"
+                text = "nothing shines: no light that a map could be wrong about"
                 bar.print(f"note: {scene.name}: {text}", sys.stderr)
             for row in visibility.rows(scene, options, bar.show):
                 if not rows:

@@ -7,10 +7,10 @@ from functools import partial
 from math import pi
 
 from deferred_ir.graph.file import find_obstacles
-from deferred_ir.profiling.checks import change_lights as lights
-from deferred_ir.profiling.checks import change_surfaces as surface
-from deferred_ir.profiling.checks import change_triangles as shape
-from deferred_ir.profiling.checks import change_views as change
+from deferred_ir.profiling.checks.changes import lights
+from deferred_ir.profiling.checks.changes import surfaces as surface
+from deferred_ir.profiling.checks.changes import triangles as shape
+from deferred_ir.profiling.checks.changes import views as change
 from deferred_ir.profiling.checks.extremes import HALF_FLOAT, Case
 
 ROUNDING = 2.0**-24

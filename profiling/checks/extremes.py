@@ -1,6 +1,6 @@
 """Extreme cases: each is rendered small and compared with rays, or with an image that it must not change.
 
-The cases are in cases.py; change_views.py, change_triangles.py and change_surfaces.py change scenes for them.
+The cases are in cases.py; The files of changes/ change scenes for them.
 docs/stability.md explains each bound.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import Error
 from deferred_ir.engine.renderer import Renderer
-from deferred_ir.profiling.checks.change_views import Unsuited, freeze, same
+from deferred_ir.profiling.checks.changes.views import Unsuited, freeze, same
 from deferred_ir.profiling.checks.trace_points import trace_with_points
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.reference import SETTINGS, Reference, trace_reference

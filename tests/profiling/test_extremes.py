@@ -9,7 +9,8 @@ import pytest
 from fixed_lights import lit_by, vpl_records
 from small_scenes import box, build, room
 
-from deferred_ir.profiling.checks import cases, change_views
+from deferred_ir.profiling.checks import cases
+from deferred_ir.profiling.checks.changes import views
 from deferred_ir.profiling.checks.extremes import Judge
 from deferred_ir.profiling.light_scenes import SCENES
 from deferred_ir.scene.lights.spotlight import Spotlight
@@ -170,7 +171,7 @@ def test_scenes_of_any_light_are_checked(judge, name: str) -> None:
         assert row.holds
         assert not row.left_out
     wrong = replace(cases.NAMED["E times 1e+20"], gain=1.01e20, size=(64, 64))
-    brighter = replace(wrong, against="rays", change=change_views.same, slack=0.0, bound=0.0)
+    brighter = replace(wrong, against="rays", change=views.same, slack=0.0, bound=0.0)
     row, other = judge.rows(scene, [wrong, brighter])
     assert not row.holds
     assert other.figure is not None

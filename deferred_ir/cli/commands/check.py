@@ -173,7 +173,7 @@ def _choose_map_sizes(text: str | None, settings: Mapping[str, Any]) -> list[Any
 def _print_visibility(work: list[tuple[Scene, visibility.Options]]) -> list[visibility.Row]:
     """Print and return all rows, with a bar on a terminal."""
     from deferred_ir.engine.settings import list_notes
-    from deferred_ir.profiling.checks import visibility
+    from deferred_ir.profiling.checks import visibility, visibility_table
 
     width = max(len(scene.name) for scene, _ in work)
     rows = list[visibility.Row]()
@@ -187,8 +187,8 @@ def _print_visibility(work: list[tuple[Scene, visibility.Options]]) -> list[visi
                 bar.print(f"note: {scene.name}: {text}", sys.stderr)
             for row in visibility.rows(scene, options, bar.show):
                 if not rows:
-                    bar.print(visibility.heading(width))
-                bar.print(visibility.line(row, width))
+                    bar.print(visibility_table.heading(width))
+                bar.print(visibility_table.line(row, width))
                 sys.stdout.flush()
                 if row.pairs < options.pairs:
                     text = f"hardly a pixel faces a light: {row.pairs} pairs, no more"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints, Vec3
-from deferred_ir.profiling.checks.change_views import find_aim, find_light, find_wall, perpendicular, vec3, with_light
+from deferred_ir.profiling.checks.changes.views import find_aim, find_light, find_wall, perpendicular, vec3, with_light
 from deferred_ir.scene.geometry import Geometry
 from deferred_ir.scene.scene import Scene
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.loading.models import move_uvs_home
-from deferred_ir.profiling.checks.change_triangles import with_geometry
+from deferred_ir.profiling.checks.changes.triangles import with_geometry
 from deferred_ir.scene.materials import Texture
 from deferred_ir.scene.scene import Scene
 

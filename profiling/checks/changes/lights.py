@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Vec3
-from deferred_ir.profiling.checks.change_triangles import add_triangles, make_box
-from deferred_ir.profiling.checks.change_views import brighten, find_wall, perpendicular, shine_alone, vec3
+from deferred_ir.profiling.checks.changes.triangles import add_triangles, make_box
+from deferred_ir.profiling.checks.changes.views import brighten, find_wall, perpendicular, shine_alone, vec3
 from deferred_ir.scene.lights.directional import Directional
 from deferred_ir.scene.lights.disc import Disc
 from deferred_ir.scene.lights.environment import Environment

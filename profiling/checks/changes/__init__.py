@@ -1,0 +1,1 @@
+"""Changes of scenes for the extreme cases."""

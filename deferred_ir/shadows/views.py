@@ -60,8 +60,10 @@ def pack_views(frame: Frame, described: DescribedViews, layout: ViewLayout, edge
         fill_view(one, view.axis[None], view.fov)
         wide = np.float32(one_minus_cos(view.fov)) > np.float32(one_minus_cos(WIDEST_PLANAR))
         record["projection"] = PARABOLOID if wide else PLANAR
-    pointed = views["projection"] != PARALLEL
-    views["position"][pointed] += views["z_axis"][pointed] * (LIFT * np.float32(frame.near))
+    # The faces of a cube look everywhere: a step along each would lead some through a surface that the light lies on.
+    alone = np.bincount(described.owners)[described.owners] == 1 if len(views) else np.zeros(0, bool)
+    lifted = (views["projection"] != PARALLEL) & alone
+    views["position"][lifted] += views["z_axis"][lifted] * (LIFT * np.float32(frame.near))
     views["size"] = layout.sizes
     places: Ints = np.array(layout.places, int).reshape(-1, 3)
     views["rectangle"][:, :2] = places[:, 1:].astype(np.float32) / np.float32(edge)

@@ -58,12 +58,12 @@ def put_in_wall(scene: Scene, area: bool) -> Scene:
 
 
 def put_on_wall(scene: Scene, area: bool) -> Scene:
-    """Put a point 10^-5 diagonals off the surface that the camera looks at, or a disc on it, which shines away."""
+    """Put a point, or a disc that shines away, on the surface that the camera looks at."""
     _, at, normal = _look(scene)
     diagonal = scene.geometry.diagonal
     if area:
         return shine_alone(scene, Disc(vec3(at), vec3(at + diagonal * normal), 0.02 * diagonal, WHITE))
-    return shine_alone(scene, Point(vec3(at + 1e-5 * diagonal * normal), WHITE))
+    return shine_alone(scene, Point(vec3(at), WHITE))
 
 
 def put_edge_on(scene: Scene) -> Scene:

@@ -1,7 +1,7 @@
 """VPLs of several lights that outlive their frame: those of spotlights and points; others are cast anew.
 
-A number of VPLs is dealt to the lights by flux when they are first seen, and stays dealt so while the same lights
-shine, however bright. All others together are one: their rays are the same in each frame, so that while they stay, so
+A number of VPLs is dealt to the lights by flux when they are first seen, and stays dealt so while lights of the same
+kinds shine, however bright. All others together are one: their rays are the same in each frame, so that while they stay, so
 do their VPLs and maps.
 """
 
@@ -41,7 +41,7 @@ class KeptVpls:
 
     def __init__(self, count: int, seed: int = 0) -> None:
         self._count, self._seed = count, seed
-        self._shining: tuple[tuple[int, str], ...] = ()
+        self._shining: tuple[tuple[str, bool], ...] | None = None
         self._dealt: list[int] = []
         self._own: dict[int, IncrementalVpls] = {}
 
@@ -57,10 +57,10 @@ class KeptVpls:
 
     def update(self, lights: Sequence[Light], tracer: Tracer, *, least: int, most: int) -> FrameVpls:
         """Advance to the next frame of `lights`, which shine. least, most: see `IncrementalVpls.update`."""
-        shining = tuple((number, light.kind) for number, light in enumerate(lights) if is_kept(light))
+        shining = tuple((light.kind, is_kept(light)) for light in lights)
         others = [light for light in lights if not is_kept(light)]
         kept = [light for light in lights if is_kept(light)]
-        if shining != self._shining or len(self._dealt) != len(kept) + 1:
+        if shining != self._shining:
             self._deal(kept, others, tracer)
             self._shining = shining
         starts = np.cumsum([0, *self._dealt])

@@ -13,8 +13,10 @@ from hypothesis import strategies as st
 from small_scenes import box, build, plane, room
 
 from deferred_ir.rays.tracer import Tracer
+from deferred_ir.scene.lights.spot import Spot
 from deferred_ir.scene.lights.spotlight import Spotlight, one_minus_cos
 from deferred_ir.vpls.incremental import IncrementalVpls
+from deferred_ir.vpls.kept_lights import KeptVpls
 
 ALBEDO = (0.5, 0.25, 0.125)
 LIGHT = Spotlight((0.1, 0.2, -0.1), (0.3, -1.0, 0.4), 100.0, (3.0, 2.0, 1.0))
@@ -170,3 +172,14 @@ def test_a_light_that_jumps_is_refilled_within_the_budget():
     assert alive[0] < 24
     assert (np.diff(alive) <= 8).all()
     assert alive[-1] == 64
+
+
+def test_a_light_of_another_kind_that_is_switched_on_gets_vpls():
+    spot = Spot((0.1, 0.2, -0.1), (0.3, -1.0, 0.4), 60.0, intensity=(3.0, 2.0, 1.0))
+    switched, fresh = KeptVpls(64), KeptVpls(64)
+    for _ in range(8):
+        switched.update((LIGHT,), EMPTY, least=2, most=8)
+    for _ in range(8):
+        after, wanted = (vpls.update((LIGHT, spot), EMPTY, least=2, most=8) for vpls in (switched, fresh))
+    assert 0 < (~wanted.kept).sum() < 64
+    np.testing.assert_array_equal(after.vpls.emission, wanted.vpls.emission)

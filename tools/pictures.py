@@ -1,7 +1,8 @@
 """Renders every picture of README and docs: `python tools/pictures.py [NAME.png ...]`, or `make pictures`.
 
 The commands are those that the pages show, besides those of the built-in scenes; the worked example of
-docs/adding-a-pass.md makes a picture of its own, and so does the viewer. (The plots are made by the commands that
+docs/adding-a-pass.md makes a picture of its own, and so does the viewer. Those of docs/lights.md show scenes that are
+made in memory. (The plots are made by the commands that
 docs/accuracy.md names.)
 """
 
@@ -15,6 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import light_pictures
 import viewer_picture
 from pages import PICTURES, ROOT, blocks, picture_commands
 
@@ -47,7 +49,7 @@ def run_example(target: Path) -> None:
 def main(wanted: list[str]) -> int:
     """Make the named pictures, or all."""
     rendered = SCENES | picture_commands()
-    known = [*rendered, EXAMPLE_PICTURE, VIEWER_PICTURE]
+    known = [*rendered, *light_pictures.PICTURES, EXAMPLE_PICTURE, VIEWER_PICTURE]
     if unknown := set(wanted) - set(known):
         print(f"no such picture: {', '.join(sorted(unknown))}; known: {', '.join(sorted(known))}", file=sys.stderr)
         return 2
@@ -56,6 +58,10 @@ def main(wanted: list[str]) -> int:
         if name in rendered:
             print(" ".join(rendered[name]), flush=True)
             subprocess.run([sys.executable, "-m", "deferred_ir", *rendered[name][1:]], cwd=ROOT, check=True)
+        elif name in light_pictures.PICTURES:
+            scenes = light_pictures.PICTURES[name]
+            print(f"{', '.join(scenes)}: {name}", flush=True)
+            light_pictures.draw(scenes, ROOT / PICTURES / name)
         elif name == VIEWER_PICTURE:
             print(f"the viewer: {name}", flush=True)
             viewer_picture.main(str(ROOT / PICTURES / name))

@@ -15,6 +15,7 @@ from deferred_ir.cli import main
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
 
+import light_pictures
 import pages
 import pictures
 
@@ -52,24 +53,26 @@ def test_renders_write_what_they_name(words, tmp_path, monkeypatch):
         assert (tmp_path / name).stat().st_size > 0
 
 
-def test_the_python_of_the_readme_runs(tmp_path):
-    (block,) = [block for block in pages.blocks(pages.ROOT / "README.md") if block.language == "python"]
+@pytest.mark.parametrize(("page", "picture"), [("README.md", "cornell.png"), ("docs/lights.md", "lights.png")])
+def test_the_python_of_the_pages_runs(tmp_path, page, picture):
+    (block,) = [block for block in pages.blocks(pages.ROOT / page) if block.language == "python"]
     assert block.text.count("size=(512, 512)") == 1
     text = block.text.replace("size=(512, 512)", 'size=(64, 64), device="software"')
     command = [sys.executable, "-W", "error", "-c", f"{text}\nassert image.radiance.shape == (64, 64, 3)\n"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "cornell.png").is_file()
+    assert (tmp_path / picture).is_file()
 
 
-def test_the_scene_file_of_the_page_renders(tmp_path, monkeypatch):
-    (block,) = [block for block in pages.blocks(pages.ROOT / "docs" / "scene-file.md") if block.file == "scene.toml"]
+@pytest.mark.parametrize(("file", "picture"), [("scene.toml", "box.png"), ("lights.toml", "lights.png")])
+def test_the_scene_files_of_the_page_render(tmp_path, monkeypatch, file, picture):
+    (block,) = [block for block in pages.blocks(pages.ROOT / "docs" / "scene-file.md") if block.file == file]
     (tmp_path / block.file).write_text(block.text, encoding="utf-8")
     for model in ("cornell.obj", "cornell.mtl"):
         shutil.copy(pages.ROOT / "scenes" / model, tmp_path)
     monkeypatch.chdir(tmp_path)
     assert main.main(["render", block.file, "--size", "32x32", "--vpls", "1", "--device", "software"]) == 0
-    assert (tmp_path / "box.png").is_file()
+    assert (tmp_path / picture).is_file()
 
 
 def test_the_moving_scene_of_the_page_moves(tmp_path, monkeypatch):
@@ -93,7 +96,8 @@ def test_every_picture_of_the_docs_is_shown_and_every_shown_one_is_there():
 
 @pytest.mark.parametrize("name", [Path(link).name for link in LINKED if link.endswith(".png")])
 def test_a_picture_has_a_command_and_is_of_a_decent_size(name):
-    assert name in MADE or name in (pictures.EXAMPLE_PICTURE, pictures.VIEWER_PICTURE)
+    scripted = (*light_pictures.PICTURES, pictures.EXAMPLE_PICTURE, pictures.VIEWER_PICTURE)
+    assert name in MADE or name in scripted
     path = pages.ROOT / pages.PICTURES / name
     assert path.stat().st_size < LARGEST
     with Image.open(path) as image:

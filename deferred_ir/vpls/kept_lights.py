@@ -1,8 +1,8 @@
 """VPLs of several lights that outlive their frame: those of spotlights and points; others are cast anew.
 
 A number of VPLs is dealt to the lights by flux when they are first seen, and stays dealt so while lights of the same
-kinds shine, however bright. All others together are one: their rays are the same in each frame, so that while they stay, so
-do their VPLs and maps.
+kinds shine, however bright. All others together are one: their rays are the same in each frame, so that while they
+stay, so do their VPLs and maps.
 """
 
 from __future__ import annotations

@@ -121,7 +121,10 @@ def report(chosen: argparse.Namespace) -> None:
     if chosen.without_mitsuba and not graphs:
         raise SettingError("--without-mitsuba: leaves nothing to compare; give --graphs")
     head = ["scene", *([] if chosen.without_mitsuba else MITSUBA_HEAD)]
-    head += [*(f"`{graph}`, {what}" for graph in graphs for what in GRAPH_HEAD), *(["noise of the reference"] if graphs else [])]
+    head += [
+        *(f"`{graph}`, {what}" for graph in graphs for what in GRAPH_HEAD),
+        *(["noise of the reference"] if graphs else []),
+    ]
     rows = []
     for name in chosen.kinds:
         scene = SCENES[name]()

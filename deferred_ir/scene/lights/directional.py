@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -38,13 +37,6 @@ class Directional(PlacedLight):
         """Yield what is wrong with the values."""
         yield from super().find_faults()
         yield from self.find_number_faults("angle", 0, 90, " degrees")
-
-    @cached_property
-    def axis(self) -> Array:
-        """Unit direction in which it shines, float64 (3,)."""
-        axis = np.subtract(self.look_at, self.position).astype(np.float64)
-        unit: Array = axis / np.linalg.norm(axis)
-        return unit
 
     @property
     def emission(self) -> Vec3:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 
-from deferred_ir.base.arrays import Vec3, add_vec3
+from deferred_ir.base.arrays import Array, Vec3, add_vec3
 from deferred_ir.base.errors import SceneError, format_value
 from deferred_ir.scene.camera import find_view_fault
 
@@ -77,6 +78,7 @@ class PlacedLight(CheckedLight):
     """A light with a `position` and a `motion`, and perhaps a `look_at`."""
 
     position: Vec3
+    look_at: Vec3
     motion: Any
 
     def find_faults(self) -> Iterator[Fault]:
@@ -86,6 +88,13 @@ class PlacedLight(CheckedLight):
         fault = look_at and self.motion is None and find_view_fault(self.position, look_at, getattr(self, "up", None))
         if fault:
             yield fault
+
+    @cached_property
+    def axis(self) -> Array:
+        """Unit direction in which it looks, for lights with a `look_at`, float64 (3,)."""
+        axis = np.subtract(self.look_at, self.position).astype(np.float64)
+        unit: Array = axis / np.linalg.norm(axis)
+        return unit
 
     def at(self, time: float) -> Self:
         """Return the light where it is at `time` seconds of its motion, at rest there."""

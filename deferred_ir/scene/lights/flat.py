@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator
-from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -35,13 +34,6 @@ class FlatLight(PlacedLight):
     def find_faults(self) -> Iterator[Fault]:
         """Yield what is wrong with the values."""
         yield from super().find_faults()
-
-    @cached_property
-    def axis(self) -> Array:
-        """Unit normal of the side that shines, float64 (3,)."""
-        axis = np.subtract(self.look_at, self.position).astype(np.float64)
-        unit: Array = axis / np.linalg.norm(axis)
-        return unit
 
     @property
     def emission(self) -> Vec3:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -45,13 +44,6 @@ class Spot(PlacedLight):
         yield from self.find_number_faults("inner_fov", 0, 180, " degrees")
         if isinstance(self.inner_fov, float) and isinstance(self.fov, float) and self.inner_fov > self.fov:
             yield "inner_fov", f"must not be more than fov, {self.fov:g}, but is {self.inner_fov:g}"
-
-    @cached_property
-    def axis(self) -> Array:
-        """Unit direction in which it looks, float64 (3,)."""
-        axis = np.subtract(self.look_at, self.position).astype(np.float64)
-        unit: Array = axis / np.linalg.norm(axis)
-        return unit
 
     @property
     def emission(self) -> Vec3:

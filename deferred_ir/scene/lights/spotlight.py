@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -37,13 +36,6 @@ class Spotlight(PlacedLight):
         yield from super().find_faults()
         yield from self.find_number_faults("fov", 0, 180, " degrees", open_ends=True)
         yield from self.find_number_faults("radius", 0)
-
-    @cached_property
-    def axis(self) -> Array:
-        """Unit direction in which it looks, float64 (3,)."""
-        axis = np.subtract(self.look_at, self.position).astype(np.float64)
-        unit: Array = axis / np.linalg.norm(axis)
-        return unit
 
     def cone(self, directions: Array) -> Array:
         """Soft edge clamp(4 (cos theta - cos(fov/2)) / (1 - cos(fov/2)), 0, 1) for unit directions (..., 3).

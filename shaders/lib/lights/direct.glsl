@@ -21,7 +21,7 @@ layout(std140, binding = LIGHTS_BINDING) uniform Lights { DirectLight lights[LIG
 // For each kind, a file: NAME_strength, the irradiance over emission.
 #include "lib/lights/kinds/"
 
-// STRENGTH_0 and so on are those functions of the kinds that the scene has.
+// STRENGTH_0 and so on are those functions of the kinds that the scene has, eight at most.
 float light_strength(DirectLight light, vec3 position, vec3 normal, vec3 shading_normal) {
 #if LIGHT_KINDS > 1
     if (light.kind == 1.0) return STRENGTH_1(light, position, normal, shading_normal);
@@ -31,6 +31,18 @@ float light_strength(DirectLight light, vec3 position, vec3 normal, vec3 shading
 #endif
 #if LIGHT_KINDS > 3
     if (light.kind == 3.0) return STRENGTH_3(light, position, normal, shading_normal);
+#endif
+#if LIGHT_KINDS > 4
+    if (light.kind == 4.0) return STRENGTH_4(light, position, normal, shading_normal);
+#endif
+#if LIGHT_KINDS > 5
+    if (light.kind == 5.0) return STRENGTH_5(light, position, normal, shading_normal);
+#endif
+#if LIGHT_KINDS > 6
+    if (light.kind == 6.0) return STRENGTH_6(light, position, normal, shading_normal);
+#endif
+#if LIGHT_KINDS > 7
+    if (light.kind == 7.0) return STRENGTH_7(light, position, normal, shading_normal);
 #endif
     return STRENGTH_0(light, position, normal, shading_normal);
 }

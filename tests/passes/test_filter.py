@@ -24,7 +24,7 @@ def shown(make, scene, lights, *, size=SIZE, seed=0, **settings):
     """What the maps say of pairs of a pixel and a light, and what rays say: both (n,)."""
     given = {"shadow_maps.spot_size": 128, "shadow_maps.vpl_size": 64} | settings
     one = make(size, visibility.GRAPH, set=given, passes=visibility.PASSES)
-    plan = one.plan(scene, outputs=[lights])
+    plan = one.plan(scene, outputs=[visibility.name_output(lights)])
     one.draw(scene, plan, seed=seed)
     pairs = visibility.trace_pairs(one, scene, lights)
     return pairs.shown, pairs.lit

@@ -49,7 +49,7 @@ def judged(renderer, projection):
     def draw(scene, lights="vpls", **settings):
         chosen = {**SMALL, "shadow_maps.projection": projection, "vpl.count": 64, **settings}
         one = renderer(SIZE, visibility.GRAPH, set=chosen, passes=visibility.PASSES)
-        plan = one.plan(scene, outputs=[lights])
+        plan = one.plan(scene, outputs=[visibility.name_output(lights)])
         one.draw(scene, plan, seed=1)
         pairs = visibility.trace_pairs(one, scene, lights)
         assert len(pairs.light) > 300

@@ -27,7 +27,7 @@ from deferred_ir.shadows.batches import make_batches
 from deferred_ir.shadows.layout import explain_resolution, lay_out
 from deferred_ir.shadows.paraboloid import draw_curved
 from deferred_ir.shadows.settings import SPOT_MAP, MapParams
-from deferred_ir.shadows.views import PARABOLOID, describe_output, pack_views, place_views
+from deferred_ir.shadows.views import NAMES, PARABOLOID, describe_output, pack_views, place_views
 
 
 class ShadowMaps(Pass):
@@ -97,10 +97,10 @@ class ShadowMaps(Pass):
         layout = layout or lay_out(
             [0] * (lights.records if isinstance(lights, Buffer) else 1), self.params, self._edge()
         )
-        names = state.names if state and state.names else ["spotlight"] * len(layout.sizes)
+        names = state.names if state and state.names else [("spotlight", "perspective")] * len(layout.sizes)
         views = [
-            {"light": name, "projection": "perspective", "layer": layer, "tile": 0, "corner": (x, y), "size": size}
-            for name, (layer, x, y), size in zip(names, layout.places, layout.sizes, strict=True)
+            {"light": name, "projection": projection, "layer": layer, "tile": 0, "corner": (x, y), "size": size}
+            for (name, projection), (layer, x, y), size in zip(names, layout.places, layout.sizes, strict=True)
         ]
         tiles = [
             {"light": f"vpl {i}", "projection": self.params.projection, "layer": layout.layers + i // per_layer}
@@ -121,7 +121,9 @@ class ShadowMaps(Pass):
         placed = place_views(views, described.rows, block)
         io["views"].write(placed)
         used = 0 if io["direct"] else len(views)
-        io.state.names = [frame.scene.direct_lights[owner].kind for owner in described.owners]
+        projections = [NAMES[number] for number in views["projection"].astype(int)]
+        kinds = [frame.scene.direct_lights[owner].kind for owner in described.owners]
+        io.state.names = list(zip(kinds, projections, strict=True))
         maps = AtlasCache.begin(io, self.params, described.owners[:used], layout, all_tiles=frame.keep_all)
         self.params.prepare(io.gpu)
         for start in range(0, len(placed) if used else 0, block):

@@ -43,7 +43,7 @@ class Params:
 
 
 class ShadowRays(Pass):
-    """Which VPLs of its share a pixel sees, and how the direct lights light it."""
+    """Visibility of the VPLs of its share at each pixel, and the light of the direct lights there."""
 
     Params = Params
     inputs: ClassVar[Mapping[str, Input]] = {

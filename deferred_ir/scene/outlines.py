@@ -10,9 +10,9 @@ from deferred_ir.base.arrays import Array
 from deferred_ir.sampling.warps import build_basis
 
 SIZE = 0.1
-"""Of what has no size of its own, in radii of the scene's bounds."""
+"""Size of outlines of what has none of its own, in radii of the scene's bounds."""
 CORNERS = 32
-"""Of the polygon that stands for a circle."""
+"""Sides of the polygon that stands for a circle."""
 HEAD = 0.2
 """Length of an arrow's head over that of the arrow."""
 

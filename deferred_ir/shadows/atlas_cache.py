@@ -34,8 +34,8 @@ class AtlasCache:
     """The maps that an atlas holds from frame to frame, by place: views of direct lights first, then tiles of VPLs.
 
     params: the parameters that the maps were drawn with. versions: int (places,), the version of the light whose map is
-    in each place; 0 if there is none. layout: of the maps of direct lights, and names: of the lights that they belong
-    to, in the last frame.
+    in each place; 0 if there is none. layout: of the maps of direct lights, and names: the kinds of their lights and
+    the projections, in the last frame.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class AtlasCache:
         self.versions: Ints = np.zeros(0, np.int64)
         self.frame: FrameMaps | None = None
         self.layout: ViewLayout | None = None
-        self.names: list[str] = []
+        self.names: list[tuple[str, str]] = []
 
     @staticmethod
     def begin(io: Io, params: MapParams, owners: Ints, layout: ViewLayout, *, all_tiles: bool) -> FrameMaps:

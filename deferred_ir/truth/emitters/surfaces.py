@@ -43,12 +43,12 @@ class EmittingSurfaces:
 
     @cached_property
     def _emits(self) -> Bools:
-        """Which materials emit."""
+        """Whether each material emits."""
         return np.array([any(material.emission) for material in self.scene.materials], bool)
 
     @cached_property
     def _both(self) -> Bools:
-        """Which materials emit from both sides."""
+        """Whether each material emits from both sides."""
         return np.array([material.emits_both_sides for material in self.scene.materials], bool)
 
     @cached_property

@@ -82,7 +82,7 @@ class Forward(Pass):
 
     def _draw_emission(self, frame: Frame, io: Io, defines: Mapping[str, Define]) -> None:
         """Draw what shines itself: surfaces, and what is behind them."""
-        if frame.scene.surface_light is not None:
+        if frame.scene.shows_emission:
             frame.buffers.draw(io.program("forward_emission.frag", "scene.vert", defines=defines))
         if io["environment"]:
             program = io.program("background.frag")

@@ -24,8 +24,8 @@ from deferred_ir.scene.lights.rect import Rect
 from deferred_ir.scene.lights.sphere import Sphere
 from deferred_ir.scene.lights.spot import Spot
 from deferred_ir.scene.lights.spotlight import Spotlight
-from deferred_ir.scene.materials import Material, Texture
 from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.surfaces.materials import Material, Texture, TextureRef
 
 HALF, HEIGHT = 2.0, 2.5
 """Half the room's width and depth, and its height."""
@@ -130,7 +130,7 @@ def _make_panels() -> Scene:
     panels = (
         (ceiling, Material("ceiling panel", black, emission=(9.0, 8.5, 8.0))),
         (sign, Material("sign", black, emission=(1.5, 3.0, 1.5), emits_both_sides=True)),
-        (screen, Material("screen", black, emission=(6.0, 6.0, 9.0), emission_texture=0)),
+        (screen, Material("screen", black, emission=(6.0, 6.0, 9.0), emission_texture=TextureRef(0))),
     )
     return _build("panels", (), ceiling=True, panels=panels, textures=(stripes,))
 

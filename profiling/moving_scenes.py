@@ -8,9 +8,9 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.scene.geometry import Geometry, Model
-from deferred_ir.scene.materials import Material
 from deferred_ir.scene.motion import LissajousMotion, ModelMotion
 from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.surfaces.materials import Material
 
 BALL = 0.06
 """Radius of the moving ball, in diagonals of the scene."""
@@ -56,6 +56,8 @@ def add_moving_ball(scene: Scene) -> Scene:
         normals=extend(geometry.normals, 0),
         uvs=extend(geometry.uvs, 0),
         colors=extend(geometry.colors, 1),
+        second_uvs=extend(geometry.second_uvs, 0),
+        tangents=extend(geometry.tangents, 0),
         moving=(model,),
     )
     materials = (*scene.materials, Material("ball", (0.7, 0.7, 0.7)))

@@ -22,7 +22,7 @@ ENVIRONMENT = Fact[tuple[int, int] | None](
     unknown=(1, 1),
     doc="Size of the image of light from all around; None without.",
 )
-EMISSION = Fact("emission", unknown=True, doc="Surfaces emit.")
+EMISSION = Fact("emission", unknown=True, doc="Surfaces are seen to emit.")
 SOFTWARE = Fact("software", unknown=True, doc="OpenGL draws on the CPU.")
 
 
@@ -37,7 +37,7 @@ def collect_facts(scene: Scene, size: tuple[int, int] | None = None, *, software
             VIEWS: tuple(x for light in direct if has_maps(light, direct) for x in light.view_halvings),
             SAMPLED: bool(scene.sampled_lights),
             ENVIRONMENT: scene.environment.size if scene.environment else None,
-            EMISSION: scene.surface_light is not None,
+            EMISSION: scene.shows_emission,
             TRIANGLES: len(scene.geometry.faces),
         }
     )

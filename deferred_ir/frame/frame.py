@@ -69,7 +69,7 @@ class Frame:
     @property
     def smooth(self) -> bool:
         """Whether shading normals may differ from the faces'."""
-        return self.buffers.has_normals
+        return self.buffers.is_smooth
 
     @property
     def near(self) -> float:
@@ -90,7 +90,7 @@ class Frame:
         """Return the surfaces that the pixels of a G-buffer show, read back once, after both textures were written."""
         key = depth, normals
         if key not in self._surfaces:
-            smooth = self.scene.geometry.normals is not None
+            smooth = self.scene.geometry.is_smooth
             self._surfaces[key] = decode_gbuffer(
                 self.scene.camera, self.near, depth.read()[..., 0], normals.read(), smooth=smooth
             )
@@ -103,7 +103,7 @@ class Frame:
         """
         key = positions, normals
         if key not in self._surfaces:
-            smooth = self.scene.geometry.normals is not None
+            smooth = self.scene.geometry.is_smooth
             self._surfaces[key] = decode_samples(positions.read(), normals.read(), smooth=smooth)
         return self._surfaces[key]
 

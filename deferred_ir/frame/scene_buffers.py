@@ -33,7 +33,7 @@ OWN = "own"
 class SceneBuffers:
     """Indexed triangles, and what shaders read of each face.
 
-    has_normals: whether there are normals at vertices. defines: tell shaders what there is of attributes,
+    is_smooth: whether shading normals may differ from the faces'. defines: tell shaders what there is of attributes,
     materials and textures, so that they have no code for the rest.
     general: add neutral normals and texture coordinates where the scene has none, so that its shaders fit any scene.
     """
@@ -50,14 +50,14 @@ class SceneBuffers:
             neutral = {"normal": np.zeros((count, 3)), "uv": np.zeros((count, 2))}
             arrays |= {name: array for name, array in neutral.items() if arrays[name] is None}
         self._runs = _find_runs(scene)
-        self.has_normals = arrays["normal"] is not None
+        self.is_smooth = g.is_smooth or general
         self.defines = {
-            "HAS_NORMALS": int(self.has_normals),
+            "HAS_NORMALS": int(arrays["normal"] is not None),
             "HAS_UVS": int(arrays["uv"] is not None),
             "HAS_COLORS": int(arrays["color"] is not None),
             "ONE_MATERIAL": int(len(scene.materials) == 1 and not general),
             "ALL_TEXTURED": int(all(run.texture is not None for run in self._runs) and not general),
-            "EMITS": int(scene.surface_light is not None),
+            "EMITS": int(scene.shows_emission),
         }
         ctx = gpu.ctx
         self._attributes = {
@@ -67,14 +67,14 @@ class SceneBuffers:
         }
         self._indices = ctx.buffer(np.ascontiguousarray(g.faces, "u4").tobytes())
         faces = _pack_faces(g, slice(None))
-        materials = np.array([(*material.albedo, 0) for material in scene.materials], "f4")
+        materials = np.array([(*material.base_color, 0) for material in scene.materials], "f4")
         self._faces, self._materials = ctx.buffer(faces.tobytes()), ctx.buffer(materials.tobytes())
         gpu.gl.check(f"scene '{scene.name}' with {len(g.faces)} triangles")
         self._textures = [self._upload(texture) for texture in scene.textures]
         self.face_count = len(g.faces)
         buffers = [*(buffer for buffer, _ in self._attributes.values()), self._indices, self._faces, self._materials]
         self._emissions = None
-        if scene.surface_light is not None:
+        if scene.shows_emission:
             emissions = [(*material.emission, material.emits_both_sides) for material in scene.materials]
             self._emissions = ctx.buffer(np.array(emissions, "f4").tobytes())
             buffers.append(self._emissions)
@@ -153,7 +153,7 @@ class SceneBuffers:
         # Decoded here, into half floats: drivers may approximate sRGB (llvmpipe is 2 % off in dark texels), and rays
         # must fetch what the rasteriser shows.
         linear = np.ones((height, width, 4), np.float32)
-        linear[..., :3] = srgb_table().astype(np.float16)[texture.pixels]
+        linear[..., :3] = srgb_table().astype(np.float16)[texture.pixels[..., :3]]
         result = GpuTexture(self.gpu, Texture("rgba16f", (width, height)), (width, height))
         result.upload(linear[::-1])
         return result
@@ -221,7 +221,10 @@ class _Run:
 
 def _find_runs(scene: Scene) -> list[_Run]:
     """Return the runs of faces with the same textures; loading sorts faces by these."""
-    textures = [(m.texture, m.emission_texture) for m in scene.materials]
+    textures = [
+        tuple(None if texture is None else texture.number for texture in (m.base_color_texture, m.emission_texture))
+        for m in scene.materials
+    ]
     kinds = {pair: number for number, pair in enumerate(dict.fromkeys(textures))}
     of_face = np.array([kinds[pair] for pair in textures])[scene.geometry.face_materials]
     starts = np.flatnonzero(np.diff(of_face, prepend=of_face[0] - 1))

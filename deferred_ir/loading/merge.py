@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,8 +12,8 @@ from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading.model_data import ModelData, Part
 from deferred_ir.scene.geometry import Geometry, Model
-from deferred_ir.scene.materials import Material, Texture
 from deferred_ir.scene.motion import ModelMotion
+from deferred_ir.scene.surfaces.materials import Material, Texture, TextureRef
 
 
 def merge(
@@ -21,29 +22,34 @@ def merge(
     """Join all models to geometry, materials, textures and vertex ranges; `file` is what an error message names.
 
     Equal materials and equal images become one. Vertices stay in the order of models and parts; faces are sorted by
-    texture and texture of emission, otherwise in that order too. Raises SceneError where everything lies in one point.
+    the textures of their materials, otherwise in that order too. Raises SceneError where everything lies in one point.
     """
     materials: dict[Material, int] = {}
-    textures: dict[tuple[tuple[int, ...], bytes], tuple[int, Texture]] = {}
+    textures: dict[tuple[Any, ...], tuple[int, Texture]] = {}
     parts = [part for model, _ in models for part in model.parts]
+    owners = [model for model, _ in models for _ in model.parts]
     counts = [len(part.positions) for part in parts]
     starts = np.concatenate([[0], np.cumsum(counts)])
     if starts[-1] >= 2**31:
         raise SceneError(f"{file}: {starts[-1]} vertices are more than 32-bit indices reach; give smaller models")
-    face_materials, face_textures, face_glows = [], [], []
+    face_materials = []
+    numbers: dict[int, int] = {}  # of textures by their ids
 
-    def number(texture: Texture | None) -> int | None:
+    def renumber(texture: TextureRef | None, owner: ModelData) -> TextureRef | None:
         if texture is None:
             return None
-        return textures.setdefault((texture.pixels.shape, texture.pixels.tobytes()), (len(textures), texture))[0]
+        own = owner.textures[texture.number]
+        if id(own) not in numbers:
+            key = own.pixels.shape, own.pixels.dtype.str, own.pixels.tobytes()
+            numbers[id(own)] = textures.setdefault(key, (len(textures), own))[0]
+        return replace(texture, number=numbers[id(own)])
 
-    for part in parts:
-        texture, glow = number(part.texture), number(part.glow)
-        material = replace(part.material, texture=texture, emission_texture=glow)
+    for part, owner in zip(parts, owners, strict=True):
+        own = {slot: renumber(texture, owner) for slot, texture in part.material.textures.items()}
+        material = part.material.with_textures(own)
         face_materials.append(np.full(len(part.faces), materials.setdefault(material, len(materials))))
-        face_textures.append(np.full(len(part.faces), -1 if texture is None else texture))
-        face_glows.append(np.full(len(part.faces), -1 if glow is None else glow))
-    order = np.lexsort((np.concatenate(face_glows), np.concatenate(face_textures)))
+    ranks = np.array([_rank(material) for material in materials])[np.concatenate(face_materials)]
+    order = np.lexsort(ranks.T[::-1])
     faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])
     ranges, first = [], 0
     for model, motion in models:
@@ -57,12 +63,19 @@ def merge(
         normals=_join(parts, lambda part: part.normals, np.zeros(3)),
         uvs=_join(parts, lambda part: part.uvs, np.zeros(2)),
         colors=_join(parts, lambda part: part.colors, np.ones(3)),
+        second_uvs=_join(parts, lambda part: part.second_uvs, np.zeros(2)),
+        tangents=_join(parts, lambda part: part.tangents, np.zeros(4)),
         moving=tuple(model for model in ranges if model.motion),
     )
     low, high = geometry.bounds
     if np.linalg.norm(high - low) <= 1e-12 * float(np.abs(geometry.bounds).max()):
         raise SceneError(f"{file}: all vertices lie in one point (to 64-bit floats); scale or move the model")
     return geometry, tuple(materials), tuple(texture for _, texture in textures.values()), tuple(ranges)
+
+
+def _rank(material: Material) -> list[int]:
+    """Return the numbers that faces are sorted by: of the material's textures, none first."""
+    return [-1 if texture is None else texture.number for texture in material.textures.values()]
 
 
 def _join(parts: list[Part], pick: Callable[[Part], Array | None], filler: Array) -> Array | None:

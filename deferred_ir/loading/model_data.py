@@ -10,7 +10,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints, Vec3
 from deferred_ir.base.errors import SceneError
-from deferred_ir.scene.materials import Material, Texture
+from deferred_ir.scene.surfaces.materials import BLACK, Material, Texture
 
 GREY = (0.8, 0.8, 0.8)
 """Albedo of a surface for which the file gives none."""
@@ -18,28 +18,29 @@ GREY = (0.8, 0.8, 0.8)
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """One mesh of a model file, placed in the world, with one material, whose textures' numbers do not count.
+    """One mesh of a model file, placed in the world, with one material, whose textures are numbered in its `ModelData`.
 
-    Arrays are as in `Geometry`; uvs are None without a texture. glow: the texture of emission.
+    Arrays are as in `Geometry`; texture coordinates are None without a texture that is read by them.
     """
 
     positions: Array
     faces: Ints
     material: Material
-    texture: Texture | None
-    glow: Texture | None
-    normals: Array | None
-    uvs: Array | None
-    colors: Array | None
+    normals: Array | None = None
+    uvs: Array | None = None
+    colors: Array | None = None
+    second_uvs: Array | None = None
+    tangents: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class ModelData:
-    """The contents of one model file: its parts in a fixed order, and notes on what is not honoured."""
+    """The contents of one model file: its parts in a fixed order, their textures, and notes on what is not honoured."""
 
     name: str
     parts: tuple[Part, ...]
     notes: tuple[str, ...]
+    textures: tuple[Texture, ...] = ()
 
 
 def check_emission(values: Any, where: str) -> Vec3:
@@ -59,8 +60,8 @@ def darken(model: ModelData) -> ModelData:
     """Return a model none of whose surfaces emits."""
 
     def turn_off(part: Part) -> Part:
-        material = replace(part.material, emission=(0.0, 0.0, 0.0), emits_both_sides=False)
-        return replace(part, material=material, glow=None)
+        material = replace(part.material, emission=BLACK, emission_texture=None, emits_both_sides=False)
+        return replace(part, material=material)
 
     return replace(model, parts=tuple(turn_off(part) for part in model.parts))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,11 @@ from deferred_ir.base.errors import SceneError
 from deferred_ir.base.toml_tables import LARGEST
 from deferred_ir.loading.formats.any_trimesh import TrimeshFormat
 from deferred_ir.loading.formats.gltf import GltfFormat
-from deferred_ir.loading.formats.model_format import WHITE, ModelFormat
+from deferred_ir.loading.formats.model_format import FileImage, ModelFormat
 from deferred_ir.loading.formats.obj import ObjFormat
 from deferred_ir.loading.model_data import ModelData, Part
 from deferred_ir.loading.textures import decode_texture
-from deferred_ir.scene.materials import Material, Texture
+from deferred_ir.scene.surfaces.materials import WHITE, Material, Texture, TextureRef
 
 ARCHIVES = ("zip", "gz", "bz2")
 """Archives are refused: trimesh unpacks them without a bound and reads their files without our corrections."""
@@ -65,8 +66,8 @@ class _Reader:
 
     def __init__(self, format: ModelFormat) -> None:
         self.format, self.path, self.notes = format, format.path, format.notes
-        self.textures: dict[int, Texture] = {}
-        self.images: list[Any] = []
+        self.textures: list[Texture] = []
+        self.images: dict[int, tuple[int, Any]] = {}
         self.texels = 0
 
     def read(self, scale: float, translate: Vec3) -> ModelData:
@@ -81,7 +82,7 @@ class _Reader:
                 parts.append(self._read_part(mesh, place @ matrix))
         if not parts:
             raise SceneError(f"{self.path}: no triangles; give a model with a surface")
-        return ModelData(self.path.stem, tuple(parts), tuple(dict.fromkeys(self.notes)))
+        return ModelData(self.path.stem, tuple(parts), tuple(dict.fromkeys(self.notes)), tuple(self.textures))
 
     def _load(self) -> Any:
         import trimesh
@@ -121,8 +122,8 @@ class _Reader:
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise SceneError(f"{self.path}: a face uses a vertex that does not exist; export it again")
         colors, uvs = self._read_attributes(mesh, len(vertices), len(faces))
-        material, texture, glow = self._read_material(mesh, colored=colors is not None, has_uvs=uvs is not None)
-        uvs = uvs if texture or glow else None
+        material = self._read_material(mesh, colored=colors is not None, has_uvs=uvs is not None)
+        uvs = uvs if any(material.textures.values()) else None
         if colors is not None and len(colors) == len(faces) and len(colors) != len(vertices):
             # Colours per face: give each face vertices of its own.
             corners = faces.ravel()
@@ -136,7 +137,7 @@ class _Reader:
             faces = faces[:, ::-1]
         if normals is not None:
             normals = _transform_normals(normals, linear)
-        return Part(positions, faces, material, texture, glow, normals, uvs, colors)
+        return Part(positions, faces, material, normals, uvs, colors)
 
     def _check_positions(self, positions: Array) -> None:
         bad = int((~np.isfinite(positions).all(axis=1)).sum())
@@ -157,34 +158,31 @@ class _Reader:
             uvs[~np.isfinite(uvs)] = 0
         return colors, move_uvs_home(uvs) if uvs is not None and len(uvs) else uvs
 
-    def _read_material(
-        self, mesh: Any, *, colored: bool, has_uvs: bool
-    ) -> tuple[Material, Texture | None, Texture | None]:
-        """Return a mesh's material, and its textures of reflectance and of emission."""
-        source = getattr(mesh.visual, "material", None)
-        name, albedo, image, image_name = self.format.read_reflectance(source, colored=colored)
-        emission = self.format.read_emission(source)
-        texture = self._read_texture(image, image_name, has_uvs=has_uvs)
-        if texture is not None and self.format.image_replaces_albedo:
-            albedo = WHITE
-        glow = self._read_texture(emission.image, emission.image_name, has_uvs=has_uvs)
-        material = Material(name, albedo, emission=emission.radiance, emits_both_sides=emission.both_sides)
-        return material, texture, glow
+    def _read_material(self, mesh: Any, *, colored: bool, has_uvs: bool) -> Material:
+        """Return a mesh's material; its textures are those read so far."""
+        material, images = self.format.read_material(getattr(mesh.visual, "material", None), colored=colored)
+        found: dict[str, TextureRef | None] = {}
+        for slot, image in images.items():
+            if has_uvs:
+                found[slot] = replace(image.use, number=self._read_texture(image))
+            else:
+                self.notes.append(
+                    f"{self.path.name}: no texture coordinates for {image.name}; its plain colour is taken"
+                )
+        if "base_color" in found and self.format.image_replaces_color:
+            material = replace(material, base_color=WHITE)
+        return material.with_textures(found)
 
-    def _read_texture(self, image: Any, name: str, *, has_uvs: bool) -> Texture | None:
-        """Return the texture of a PIL image, None for none; an image is decoded once."""
-        if image is None:
-            return None
-        if not has_uvs:
-            self.notes.append(f"{self.path.name}: no texture coordinates for {name}; its plain colour is taken")
-            return None
-        if id(image) not in self.textures:
+    def _read_texture(self, found: FileImage) -> int:
+        """Return the number of the texture of a PIL image, which is decoded once."""
+        image = found.image
+        if id(image) not in self.images:
             self.texels += image.width * image.height
             if self.texels > MOST_TEXELS:
                 raise SceneError(f"{self.path}: its images have more than {MOST_TEXELS} pixels; scale them down")
-            self.textures[id(image)] = decode_texture(image, name, self.notes)
-            self.images.append(image)  # its id must stay its own
-        return self.textures[id(image)]
+            self.images[id(image)] = len(self.textures), image  # which must live: its id must stay its own
+            self.textures.append(decode_texture(image, found.name, self.notes))
+        return self.images[id(image)][0]
 
 
 def move_uvs_home(uvs: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.errors import SceneError
-from deferred_ir.scene.materials import Texture
+from deferred_ir.scene.surfaces.materials import Texture
 
 IMAGE_FORMATS = (
     "PNG",

@@ -10,7 +10,7 @@ import os
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -19,7 +19,8 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.rays.embree import INFINITE, EmbreeScenes
 from deferred_ir.scene.scene import Scene
-from deferred_ir.scene.surface_colours import look_up_albedo
+from deferred_ir.scene.surfaces.brdf import Gloss
+from deferred_ir.scene.surfaces.points import SurfacePoints
 
 CHUNK = 1 << 15
 OFFSET = 1e-5
@@ -31,9 +32,10 @@ origin where that is larger: float32 positions err by 1e-7 of it."""
 class Hits:
     """The closest hits of n rays; rows of rays that miss hold zeros and face -1.
 
-    face: int32 (n,). position: float64 (n, 3). albedo: float64 (n, 3).
+    face: int32 (n,). position: float64 (n, 3). albedo: diffuse reflectance, float64 (n, 3).
     normal: geometric normal, shading_normal: both unit, float64 (n, 3), facing
         the ray's origin as docs/conventions.md says.
+    gloss: of all rows; None where no surface of the scene is glossy.
     """
 
     face: Ints
@@ -41,6 +43,7 @@ class Hits:
     normal: Array
     shading_normal: Array
     albedo: Array
+    gloss: Gloss | None = None
 
     @property
     def hit(self) -> Bools:
@@ -49,7 +52,15 @@ class Hits:
 
     def rows(self, chosen: Ints) -> Hits:
         """Return the hits of the rays `chosen`, indices (m,)."""
-        return Hits(*(getattr(self, field.name)[chosen] for field in fields(self)))
+        gloss = None if self.gloss is None else self.gloss.rows(chosen)
+        return Hits(
+            self.face[chosen],
+            self.position[chosen],
+            self.normal[chosen],
+            self.shading_normal[chosen],
+            self.albedo[chosen],
+            gloss,
+        )
 
 
 class Tracer:
@@ -114,17 +125,24 @@ class Tracer:
         corners, weights = geometry.faces[face[hit]], weights[hit]
         position, normal, shading, albedo = (np.zeros((len(face), 3)) for _ in range(4))
         position[hit] = interpolate(geometry.positions, corners, weights)
-        facing = face_towards(geometry.face_normals[face[hit]], -directions[hit])
-        smooth = facing.copy()
-        if geometry.normals is not None:
-            blend = interpolate(geometry.normals, corners, weights)
-            length = np.sqrt(np.einsum("ij,ij->i", blend, blend))
-            has = length > 1e-6
-            smooth[has] = face_towards(blend[has] / length[has, None], facing[has])
-        normal[hit], shading[hit] = facing, smooth
+        own = geometry.face_normals[face[hit]]
+        normal[hit] = shading[hit] = facing = face_towards(own, -directions[hit])
         scene = self.scene
-        albedo[hit] = look_up_albedo(scene.geometry, scene.materials, scene.textures, face[hit], weights)
-        return Hits(face, position, normal, shading, albedo)
+        at = SurfacePoints(geometry, scene.materials, scene.textures, face[hit], weights)
+        if geometry.is_smooth:
+            smooth = own.copy()
+            if geometry.normals is not None:
+                blend = interpolate(geometry.normals, corners, weights)
+                length = np.sqrt(np.einsum("ij,ij->i", blend, blend))
+                has = length > 1e-6
+                smooth[has] = blend[has] / length[has, None]
+            shading[hit] = face_towards(at.bend_normals(smooth), facing)
+        base = at.look_up_base_color()
+        if not scene.has_gloss:
+            albedo[hit] = base
+            return Hits(face, position, normal, shading, albedo)
+        albedo[hit], gloss = at.look_up_gloss(base)
+        return Hits(face, position, normal, shading, albedo, gloss.spread(hit))
 
     def occluded(self, origins: Array, targets: Array, *, lifted: bool = False) -> Bools:
         """Return whether anything lies strictly between points (n, 3) and (n, 3), bool (n,).

@@ -33,7 +33,7 @@ def list_for_scene(scene: Scene) -> list[LeftOut]:
     """List the vertex attributes, and the code that reads them, that this scene does not need."""
     g = scene.geometry
     vertices = len(g.positions)
-    textured = {material.texture is not None for material in scene.materials}
+    textured = {material.base_color_texture is not None for material in scene.materials}
     found = [
         (g.normals is None, LeftOut("vertex normals", "the scene has none", bytes=12 * vertices)),
         (g.colors is None, LeftOut("vertex colours", "the scene has none", bytes=12 * vertices)),

@@ -59,11 +59,12 @@ class Geometry:
 
     positions: float64 (V, 3).
     faces: int32 (F, 3), counter-clockwise from the front.
-    face_materials: int32 (F,), index into Scene.materials. Faces are sorted by their material's texture: first those
-        without one, then texture 0, 1, ...
+    face_materials: int32 (F,), index into Scene.materials. Loading sorts faces by the textures of these.
     normals: float32 (V, 3) unit shading normals, a zero row where the file has none (the face's normal counts there);
         None if no vertex has one.
-    uvs: float32 (V, 2), or None if no material has a texture.
+    uvs, second_uvs: float32 (V, 2), v upwards; None if no texture is read by them.
+    tangents: float32 (V, 4), unit, along u of the normal map; the bitangent is the fourth * cross(normal, tangent). A
+        zero row where there is none; None without normal maps.
     colors: float32 (V, 3) linear vertex colours that multiply the albedo, or None.
     moving: the models that have a motion.
     medians: overrides `middle` and `spread`, which are otherwise computed from the faces.
@@ -75,6 +76,8 @@ class Geometry:
     normals: Array | None = None
     uvs: Array | None = None
     colors: Array | None = None
+    second_uvs: Array | None = None
+    tangents: Array | None = None
     moving: tuple[Model, ...] = ()
     medians: tuple[Array, float] | None = None
     _last_pose: _LastPose = field(default_factory=_LastPose, init=False, repr=False)
@@ -88,6 +91,11 @@ class Geometry:
     def poses(self) -> Array:
         """Rigid transforms of the moving models from rest to where they are, float64 (m, 4, 4)."""
         return np.tile(np.eye(4), (len(self.moving), 1, 1))
+
+    @property
+    def is_smooth(self) -> bool:
+        """Whether shading normals may differ from the faces'."""
+        return self.normals is not None or self.tangents is not None
 
     @property
     def moves(self) -> bool:
@@ -108,11 +116,14 @@ class Geometry:
         last = self._last_pose.geometry  # read once: another thread may pose this geometry meanwhile
         if last is not None and np.array_equal(last.poses, poses):
             return last
-        positions, normals = self.positions.copy(), None if self.normals is None else self.normals.copy()
+        positions = self.positions.copy()
+        normals, tangents = (None if array is None else array.copy() for array in (self.normals, self.tangents))
         for model, matrix in zip(self.moving, poses, strict=True):
             positions[model.vertices] = transform_points(self.positions[model.vertices], matrix)
             if normals is not None:
                 normals[model.vertices] = normals[model.vertices] @ matrix[:3, :3].T
+            if tangents is not None:
+                tangents[model.vertices, :3] = tangents[model.vertices, :3] @ matrix[:3, :3].T
         posed = PosedGeometry(
             positions,
             self.faces,
@@ -120,6 +131,8 @@ class Geometry:
             normals,
             self.uvs,
             self.colors,
+            self.second_uvs,
+            tangents,
             self.moving,
             _rest=self,
             _poses=poses,

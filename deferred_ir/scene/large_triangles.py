@@ -50,6 +50,8 @@ def split_large_triangles(geometry: Geometry) -> Geometry:
         normals=extend(geometry.normals),
         uvs=extend(geometry.uvs),
         colors=extend(geometry.colors),
+        second_uvs=extend(geometry.second_uvs),
+        tangents=extend(geometry.tangents),
         medians=(geometry.middle, geometry.spread),
     )
 

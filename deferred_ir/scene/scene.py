@@ -22,8 +22,8 @@ from deferred_ir.scene.lights.base import Bounds, DirectLight, Light, SampledLig
 from deferred_ir.scene.lights.environment import Environment
 from deferred_ir.scene.lights.fields import LightError
 from deferred_ir.scene.lights.spotlight import Spotlight
-from deferred_ir.scene.materials import Material, Texture
 from deferred_ir.scene.surface_light import SurfaceLight, find_surface_light
+from deferred_ir.scene.surfaces.materials import Material, Texture
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Scene:
 
         digest = hashlib.sha256()
         g = self.geometry
-        for array in (g.positions, g.faces, g.face_materials, g.normals, g.uvs, g.colors):
+        for array in (g.positions, g.faces, g.face_materials, g.normals, g.uvs, g.colors, g.second_uvs, g.tangents):
             digest.update(b"-" if array is None else np.ascontiguousarray(array).tobytes())
         for texture in self.textures:
             digest.update(repr(texture.pixels.shape).encode() + np.ascontiguousarray(texture.pixels).tobytes())
@@ -113,6 +113,21 @@ class Scene:
         """Its emitting surfaces as a light, None if there are none."""
         return _find_surface_light(self.geometry, self.materials, self.textures)
 
+    @cached_property
+    def has_gloss(self) -> bool:
+        """Whether a surface reflects other than as a Lambertian one."""
+        return any(material.is_glossy for material in self.materials)
+
+    @cached_property
+    def has_cutouts(self) -> bool:
+        """Whether some of a surface may not be there."""
+        return any(material.is_cut for material in self.materials)
+
+    @cached_property
+    def shows_emission(self) -> bool:
+        """Whether surfaces are seen to emit."""
+        return any(material.emits for material in self.materials)
+
     @property
     def emits(self) -> bool:
         """Whether anything shines."""
@@ -158,7 +173,7 @@ def _find_surface_light(
     geometry: Geometry, materials: tuple[Material, ...], textures: tuple[Texture, ...]
 ) -> SurfaceLight | None:
     """Return the emitting surfaces as a light; the same object for the same scene."""
-    if not any(any(material.emission) for material in materials):
+    if not any(material.emits and not material.unlit for material in materials):
         return None
     made_from, found = _surface_lights.get(geometry, (None, None))
     if made_from != (materials, textures):

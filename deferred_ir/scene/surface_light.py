@@ -15,8 +15,8 @@ from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.sampling.warps import disc_to_square, lift_to_hemisphere
 from deferred_ir.scene.geometry import Geometry
 from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples, aim
-from deferred_ir.scene.materials import Material, Texture
-from deferred_ir.scene.surface_colours import look_up_emission
+from deferred_ir.scene.surfaces.materials import Material, Texture
+from deferred_ir.scene.surfaces.points import SurfacePoints
 
 LIFT = 2e-5
 """How far off a surface its rays start, in radii of the scene's bounds."""
@@ -63,7 +63,7 @@ class SurfaceLight:
         faces = self.faces[row]
         corners = self.geometry.positions[self.geometry.faces[faces]]
         position = np.einsum("nij,ni->nj", corners, weights)
-        radiance = look_up_emission(self.geometry, self.materials, self.textures, faces, weights)
+        radiance = SurfacePoints(self.geometry, self.materials, self.textures, faces, weights).look_up_emission()
         density = self.chances[row] / self.geometry.face_areas[faces]
         return position, self.geometry.face_normals[faces] * self.sides[row][:, None], radiance / density[:, None]
 
@@ -113,7 +113,7 @@ def find_surface_light(
     geometry: Geometry, materials: tuple[Material, ...], textures: tuple[Texture, ...]
 ) -> SurfaceLight | None:
     """Return the emitting surfaces of a scene as a light, None if there are none."""
-    emits = np.array([any(material.emission) for material in materials], bool)
+    emits = np.array([material.emits and not material.unlit for material in materials], bool)
     faces = np.flatnonzero(emits[geometry.face_materials] & (geometry.face_areas > 0))
     if not len(faces):
         return None
@@ -141,7 +141,8 @@ def _measure_power(
         rng, total = np.random.default_rng(0), np.zeros(len(some))
         for a, b in rng.random((PROBES, 2)):
             weights = np.tile([1 - np.sqrt(a), np.sqrt(a) * (1 - b), np.sqrt(a) * b], (len(some), 1))
-            total += look_up_emission(geometry, materials, textures, faces[some], weights) @ LUMINANCE
+            points = SurfacePoints(geometry, materials, textures, faces[some], weights)
+            total += points.look_up_emission() @ LUMINANCE
         level[some] = (1 - FLOOR) * total / PROBES + FLOOR * level[some]
     power: Array = geometry.face_areas[faces] * level
     return power
@@ -149,4 +150,6 @@ def _measure_power(
 
 def _find_mean(material: Material, textures: tuple[Texture, ...]) -> float:
     """Return the mean luminance of a material's texture of emission, 1 if it has none."""
-    return 1.0 if material.emission_texture is None else float(textures[material.emission_texture].mean @ LUMINANCE)
+    return (
+        1.0 if material.emission_texture is None else float(textures[material.emission_texture.number].mean @ LUMINANCE)
+    )

@@ -13,8 +13,8 @@ from deferred_ir.profiling.peers.cycles_lights import convert_lights
 from deferred_ir.profiling.peers.cycles_nodes import Nodes, make_matrix
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.geometry import Geometry
-from deferred_ir.scene.materials import Material, Texture
 from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.surfaces.materials import Material, Texture, TextureRef
 
 FARTHEST = 10.0
 """Far plane, in distances from the camera to the farthest corner of the scene."""
@@ -78,10 +78,10 @@ def _attribute(mesh: Any, name: str, kind: str, domain: str, values: Array) -> N
 
 def _image(bpy: Any, texture: Texture) -> Any:
     """Build an image of linear floats: Cycles would decode sRGB after filtering, and we decode before."""
-    height, width, _ = texture.pixels.shape
+    height, width = texture.pixels.shape[:2]
     image = bpy.data.images.new(texture.name, width, height, alpha=False, float_buffer=True, is_data=True)
     pixels = np.ones((height, width, 4), np.float32)
-    pixels[..., :3] = srgb_table()[texture.pixels[::-1]]
+    pixels[..., :3] = srgb_table()[texture.pixels[::-1, :, :3]]
     image.pixels.foreach_set(pixels.ravel())
     return image
 
@@ -92,7 +92,7 @@ def _material(bpy: Any, material: Material, images: Sequence[Any], colored: bool
     result.use_nodes = True
     nodes = Nodes(result.node_tree)
     diffuse = nodes.add("ShaderNodeBsdfDiffuse", Roughness=0.0)
-    reflectance = _textured(nodes, material.albedo, None if material.texture is None else images[material.texture])
+    reflectance = _textured(nodes, material.base_color, _find_image(material.base_color_texture, images))
     if colored:
         color = nodes.add("ShaderNodeAttribute")
         color.attribute_name = "tint"
@@ -100,8 +100,7 @@ def _material(bpy: Any, material: Material, images: Sequence[Any], colored: bool
     nodes.join(reflectance, diffuse.inputs["Color"])
     surface = diffuse.outputs["BSDF"]
     if any(material.emission):
-        number = material.emission_texture
-        radiance = _textured(nodes, material.emission, None if number is None else images[number])
+        radiance = _textured(nodes, material.emission, _find_image(material.emission_texture, images))
         emission = nodes.add("ShaderNodeEmission", Color=radiance)
         if not material.emits_both_sides:
             behind = nodes.add("ShaderNodeNewGeometry").outputs["Backfacing"]
@@ -113,6 +112,10 @@ def _material(bpy: Any, material: Material, images: Sequence[Any], colored: bool
         result.cycles.emission_sampling = "FRONT_BACK" if material.emits_both_sides else "FRONT"
     nodes.join(surface, nodes.add("ShaderNodeOutputMaterial").inputs["Surface"])
     return result
+
+
+def _find_image(texture: TextureRef | None, images: Sequence[Any]) -> Any:
+    return None if texture is None else images[texture.number]
 
 
 def _textured(nodes: Nodes, factor: Vec3, image: Any) -> Any:

@@ -11,8 +11,8 @@ from deferred_ir.base.colour import srgb_table
 from deferred_ir.base.errors import SettingError
 from deferred_ir.frame.frame import NEAR
 from deferred_ir.profiling.peers.mitsuba_lights import convert_lights, make_bitmap
-from deferred_ir.scene.materials import Material
 from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.surfaces.materials import Material, TextureRef
 
 SAMPLER = "multijitter"
 FAR = 1e3
@@ -82,14 +82,14 @@ def _mesh(mi: Any, scene: Scene, number: int, faces: Ints, *, smooth: bool = Fal
     else:
         used, corners = np.unique(geometry.faces[faces], return_inverse=True)
         behind = np.zeros((len(used), 3))
-    images = material.texture, material.emission_texture
+    images = material.base_color_texture, material.emission_texture
     textured = images != (None, None) and geometry.uvs is not None
     colors = None if geometry.colors is None else geometry.colors[used]
     if colors is not None and (colors == colors[0]).all():
-        albedo, colors = np.multiply(material.albedo, colors[0]), None
+        albedo, colors = np.multiply(material.base_color, colors[0]), None
     else:
-        albedo = np.asarray(material.albedo)
-    if material.texture is not None and geometry.uvs is not None and colors is not None:
+        albedo = np.asarray(material.base_color)
+    if material.base_color_texture is not None and geometry.uvs is not None and colors is not None:
         raise SettingError(
             f"mitsuba: cannot multiply the vertex colours of '{material.name}' by its image texture, as this scene does"
         )
@@ -129,12 +129,12 @@ def _mesh(mi: Any, scene: Scene, number: int, faces: Ints, *, smooth: bool = Fal
 def _reflectance(mi: Any, scene: Scene, material: Material, albedo: Array, colors: Array | None) -> dict[str, Any]:
     if colors is not None:
         return {"type": "mesh_attribute", "name": "vertex_color"}
-    return _textured(mi, scene, material.texture, albedo)
+    return _textured(mi, scene, material.base_color_texture, albedo)
 
 
-def _textured(mi: Any, scene: Scene, image: int | None, factor: Array) -> dict[str, Any]:
+def _textured(mi: Any, scene: Scene, image: TextureRef | None, factor: Array) -> dict[str, Any]:
     """Return `factor` (3,) times a texture of the scene, if there is one."""
     if image is None or scene.geometry.uvs is None:
         return {"type": "rgb", "value": factor.tolist()}
     # Linear before filtering, as ours; the filter is linear, so the factor can be in its pixels.
-    return make_bitmap(mi, srgb_table()[scene.textures[image].pixels] * factor.astype(np.float32))
+    return make_bitmap(mi, srgb_table()[scene.textures[image.number].pixels[..., :3]] * factor.astype(np.float32))

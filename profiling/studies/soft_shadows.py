@@ -27,8 +27,8 @@ from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.geometry import Geometry, Model
 from deferred_ir.scene.lights.spotlight import Spotlight
-from deferred_ir.scene.materials import Material
 from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.surfaces.materials import Material
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.path_tracer import PathTracer
 

@@ -68,7 +68,7 @@ def test_the_same_geometry_is_uploaded_once(renderer):
 
 def test_new_materials_on_the_same_geometry_show(renderer):
     scene = room()
-    red = replace(scene, materials=tuple(replace(material, albedo=(0.8, 0.0, 0.0)) for material in scene.materials))
+    red = replace(scene, materials=tuple(replace(material, base_color=(0.8, 0.0, 0.0)) for material in scene.materials))
     one = renderer(SIZE)
     one.render(scene, vpls=8)
     np.testing.assert_array_equal(one.render(red, vpls=8).radiance, renderer(SIZE).render(red, vpls=8).radiance)

@@ -79,7 +79,7 @@ def test_nothing_was_chosen_or_passed_over(scene: Scene):
     assert not scene.chosen
     assert not scene.notes
     assert scene.camera.fov > 0
-    assert all(0 <= value <= 0.9 for m in scene.materials if m.texture is None for value in m.albedo)
+    assert all(0 <= value <= 0.9 for m in scene.materials if m.base_color_texture is None for value in m.base_color)
 
 
 def test_no_triangle_occurs_twice(scene: Scene):
@@ -137,7 +137,7 @@ def test_cornell_is_red_on_the_left_and_green_on_the_right():
     assert material_of(scene, face[32, 4]) == "red"
     assert material_of(scene, face[32, 60]) == "green"
     assert material_of(scene, face[4, 32]) == "white"
-    albedo = {material.name: material.albedo for material in scene.materials}
+    albedo = {material.name: material.base_color for material in scene.materials}
     assert albedo["red"] == pytest.approx((0.612, 0.060, 0.061), abs=1e-12)
     assert albedo["green"] == pytest.approx((0.124, 0.424, 0.106), abs=1e-12)
 
@@ -173,7 +173,7 @@ def test_arcades_of_the_atrium_are_lit_indirectly_only():
 def test_atrium_colours_are_exact_in_the_file():
     scene = load("atrium")
     for material in scene.materials:
-        assert material.albedo == pytest.approx(np.array(atrium.COLORS[material.name]) / 255, abs=1e-12)
+        assert material.base_color == pytest.approx(np.array(atrium.COLORS[material.name]) / 255, abs=1e-12)
 
 
 @pytest.mark.slow
@@ -202,8 +202,8 @@ def test_script_makes_the_committed_colors(tmp_path):
 
 def test_floor_of_colors_repeats_its_texture():
     scene = load("colors")
-    floor = next(i for i, material in enumerate(scene.materials) if material.texture is not None)
-    assert scene.textures[scene.materials[floor].texture].pixels.shape == (512, 512, 3)
+    floor = next(i for i, material in enumerate(scene.materials) if material.base_color_texture is not None)
+    assert scene.textures[scene.materials[floor].base_color_texture.number].pixels.shape == (512, 512, 3)
     corners = scene.geometry.faces[scene.geometry.face_materials == floor]
     assert np.ptp(scene.geometry.uvs[corners].reshape(-1, 2), axis=0) == pytest.approx([1, 1.5])
 

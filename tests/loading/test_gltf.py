@@ -20,7 +20,8 @@ from deferred_ir.loading import merge, models
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.scene import Scene
-from deferred_ir.scene.surface_colours import look_up_albedo
+from deferred_ir.scene.surfaces.materials import TextureRef
+from deferred_ir.scene.surfaces.points import SurfacePoints
 
 TYPES = {"float32": 5126, "uint8": 5121, "uint16": 5123, "uint32": 5125}
 SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
@@ -100,7 +101,7 @@ def test_base_colours_are_not_rounded_and_found_by_index(tmp_path: Path, name: s
     geometry = scene.geometry
     in_places = np.argsort(geometry.positions[geometry.faces[:, 0], 0])
     found = [scene.materials[index] for index in geometry.face_materials[in_places]]
-    assert [item.albedo for item in found] == [(0.5, 0.25, 0.125), (0.1234, 0.03, 0.98765), (0.75,) * 3, (1.0,) * 3]
+    assert [item.base_color for item in found] == [(0.5, 0.25, 0.125), (0.1234, 0.03, 0.98765), (0.75,) * 3, (1.0,) * 3]
     assert [item.name for item in found[:3]] == ["same", "same", "2"]
     assert scene.notes == ()
 
@@ -115,7 +116,9 @@ def test_base_colour_multiplies_the_texture_and_vertex_colours(tmp_path: Path) -
     colors = np.tile(np.array([1, 0.3, 1, 0.5], np.float32), (3, 1))
     document.triangle({"material": 0}, TEXCOORD_0=document.accessor(UVS), COLOR_0=document.accessor(colors))
     scene = load(document.write(tmp_path / "m.glb"))
-    found = look_up_albedo(scene.geometry, scene.materials, scene.textures, np.array([0]), np.full((1, 3), 1 / 3))
+    found = SurfacePoints(
+        scene.geometry, scene.materials, scene.textures, np.array([0]), np.full((1, 3), 1 / 3)
+    ).look_up_base_color()
     assert found == pytest.approx(np.array([[0.5, 0.3, 0.0]]), abs=1e-6)
     assert scene.geometry.uvs == pytest.approx(np.array([[0, 0], [1, 0], [0, 1]]))
 
@@ -141,7 +144,7 @@ def test_specular_glossiness_keeps_its_diffuse_colour(tmp_path: Path) -> None:
     document = Document(materials=[{"extensions": glossy}], extensionsUsed=list(glossy))
     document.triangle({"material": 0})
     scene = load(document.write(tmp_path / "m.gltf"))
-    assert scene.materials[0].albedo == (0.2, 0.3, 0.4)
+    assert scene.materials[0].base_color == (0.2, 0.3, 0.4)
     assert "not honoured: KHR_materials_pbrSpecularGlossiness" in scene.notes[0]
 
 
@@ -224,7 +227,7 @@ def test_one_image_of_two_materials_is_one_texture(tmp_path: Path) -> None:
         document.triangle({"material": index}, TEXCOORD_0=document.accessor(UVS))
     scene = load(document.write(tmp_path / "m.glb"))
     assert len(scene.textures) == 1
-    assert [item.texture for item in scene.materials] == [0, 0]
+    assert [item.base_color_texture for item in scene.materials] == [TextureRef(0)] * 2
 
 
 @pytest.mark.parametrize(
@@ -306,8 +309,8 @@ def test_emission_times_its_strength_and_image(tmp_path: Path, both: bool) -> No
     assert scene.notes == ()
     first, second, third = sorted(scene.materials, key=lambda material: material.name)
     assert (first.emission, first.emits_both_sides) == ((4.0, 8.0, 2.0), both)
-    assert first.texture is None
-    assert first.emission_texture == 0
+    assert first.base_color_texture is None
+    assert first.emission_texture == TextureRef(0)
     assert (second.emission, second.emission_texture, second.emits_both_sides) == ((0.0, 0.0, 2.0), None, False)
     assert third.emission == (0.0, 0.0, 0.0)
     assert scene.surface_light is not None

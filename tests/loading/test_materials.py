@@ -20,16 +20,17 @@ from deferred_ir.loading import merge, models, textures
 from deferred_ir.loading.model_data import GREY
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spotlight import Spotlight
-from deferred_ir.scene.materials import Texture
 from deferred_ir.scene.scene import Scene
-from deferred_ir.scene.surface_colours import look_up_albedo, look_up_emission, sample_texture
+from deferred_ir.scene.surfaces.materials import Texture, TextureRef
+from deferred_ir.scene.surfaces.points import SurfacePoints
+from deferred_ir.scene.surfaces.texture_lookup import sample_texture
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 FACES = "usemtl m\nf 1/1 2/2 3/3 4/4\n"
 
 
 def albedo_at(scene: Scene, faces: Any, weights: Any) -> Any:
-    return look_up_albedo(scene.geometry, scene.materials, scene.textures, faces, weights)
+    return SurfacePoints(scene.geometry, scene.materials, scene.textures, faces, weights).look_up_base_color()
 
 
 def scene_of(path: Path) -> Scene:
@@ -53,7 +54,7 @@ def srgb(level: float) -> float:
 
 def test_kd_is_not_rounded(tmp_path: Path) -> None:
     scene = scene_with(tmp_path, "newmtl m\nKd 0.1234 0.03 0.98765\n")
-    assert scene.materials[0].albedo == (0.1234, 0.03, 0.98765)
+    assert scene.materials[0].base_color == (0.1234, 0.03, 0.98765)
     assert scene.materials[0].name == "m"
     weights = np.array([[0.2, 0.3, 0.5]])
     assert albedo_at(scene, np.array([0]), weights) == pytest.approx(np.array([[0.1234, 0.03, 0.98765]]))
@@ -61,12 +62,12 @@ def test_kd_is_not_rounded(tmp_path: Path) -> None:
 
 
 def test_one_number_is_grey(tmp_path: Path) -> None:
-    assert scene_with(tmp_path, "newmtl m\nKd 0.3\n").materials[0].albedo == (0.3, 0.3, 0.3)
+    assert scene_with(tmp_path, "newmtl m\nKd 0.3\n").materials[0].base_color == (0.3, 0.3, 0.3)
 
 
 def test_kd_above_1_is_cut_with_a_note(tmp_path: Path) -> None:
     scene = scene_with(tmp_path, "newmtl m\nKd 0.5 1.5 1\n")
-    assert scene.materials[0].albedo == (0.5, 1.0, 1.0)
+    assert scene.materials[0].base_color == (0.5, 1.0, 1.0)
     assert any("material m: reflectance above 1 is cut to 1" in note for note in scene.notes)
 
 
@@ -78,30 +79,30 @@ def test_kd_that_is_no_reflectance(tmp_path: Path, kd: str) -> None:
 
 def test_without_a_material_it_is_grey(tmp_path: Path) -> None:
     (tmp_path / "model.obj").write_text(SQUARE + "f 1 2 3 4\n")
-    assert scene_of(tmp_path / "model.obj").materials[0].albedo == GREY
+    assert scene_of(tmp_path / "model.obj").materials[0].base_color == GREY
     (tmp_path / "model.obj").write_text(SQUARE + "f 1/1 2/2 3/3\n")
     scene = scene_of(tmp_path / "model.obj")
-    assert scene.materials[0].albedo == GREY
+    assert scene.materials[0].base_color == GREY
     assert scene.textures == ()
 
 
 def test_missing_kd_is_grey_with_a_note(tmp_path: Path) -> None:
     for line in ("Ks 1 1 1", "Kd spectral file.rfl", ""):
         scene = scene_with(tmp_path, f"newmtl m\n{line}\nNs 3\n")
-        assert scene.materials[0].albedo == GREY
+        assert scene.materials[0].base_color == GREY
         assert any("material m has no Kd" in note for note in scene.notes)
 
 
 def test_other_lines_of_a_material_file_do_no_harm(tmp_path: Path) -> None:
     scene = scene_with(tmp_path, "Kd 1 1 1\nnewmtl m\nKa 0.5\nKd 0.1 0.2 0.3 # dark\nKs\nillum x\nd -halo 1\n")
-    assert scene.materials[0].albedo == (0.1, 0.2, 0.3)
+    assert scene.materials[0].base_color == (0.1, 0.2, 0.3)
     assert scene.notes == ()
 
 
 def test_missing_material_file_and_material_are_noted(tmp_path: Path) -> None:
     (tmp_path / "model.obj").write_text(f"# no mtllib here\nmtllib gone.mtl\n{SQUARE}{FACES}")
     scene = scene_of(tmp_path / "model.obj")
-    assert scene.materials[0].albedo == GREY
+    assert scene.materials[0].base_color == GREY
     assert scene.notes[:2] == (
         "model.obj: its material file gone.mtl is missing",
         "model.obj: no material m; its surfaces are grey",
@@ -115,15 +116,18 @@ def test_several_material_files(tmp_path: Path) -> None:
     (tmp_path / "c.mtl").write_text("newmtl n\nKd 0.25 0.5 0.75")
     (tmp_path / "model.obj").write_text(f"mtllib sub\\a b.mtl\nmtllib c.mtl\n{SQUARE}{FACES}usemtl n\nf 1/1 2/2 3/3\n")
     scene = scene_of(tmp_path / "model.obj")
-    assert {material.name: material.albedo for material in scene.materials} == {"m": (1, 1, 1), "n": (0.25, 0.5, 0.75)}
+    assert {material.name: material.base_color for material in scene.materials} == {
+        "m": (1, 1, 1),
+        "n": (0.25, 0.5, 0.75),
+    }
     assert len(scene.textures) == 1
 
 
 def test_map_kd_replaces_kd(tmp_path: Path) -> None:
     Image.new("RGB", (4, 2), (188, 0, 255)).save(tmp_path / "t.png")
     scene = scene_with(tmp_path, "newmtl m\nKd 0.5 0.5 0.5\nmap_Kd t.png\n")
-    assert scene.materials[0].albedo == (1.0, 1.0, 1.0)
-    assert scene.materials[0].texture == 0
+    assert scene.materials[0].base_color == (1.0, 1.0, 1.0)
+    assert scene.materials[0].base_color_texture == TextureRef(0)
     assert scene.textures[0].pixels.shape == (2, 4, 3)
     found = albedo_at(scene, np.array([0, 1]), np.full((2, 3), 1 / 3))
     assert found == pytest.approx(np.tile([srgb(188), 0, 1], (2, 1)), rel=1e-6)
@@ -142,9 +146,7 @@ def test_texture_stands_upright(tmp_path: Path) -> None:
         system = np.vstack([edges.T, np.ones(3)])
         weights = np.linalg.solve(system, [*centre_of_texel, 1.0])
         if weights.min() > -1e-9:
-            assert look_up_albedo(
-                scene.geometry, scene.materials, scene.textures, np.array([face]), weights[None]
-            ) == pytest.approx(np.ones((1, 3)))
+            assert albedo_at(scene, np.array([face]), weights[None]) == pytest.approx(np.ones((1, 3)))
             position = weights @ geometry.positions[geometry.faces[face]]
             assert position[:2] == pytest.approx(centre_of_texel)  # v runs up, as y does
 
@@ -168,7 +170,7 @@ def test_an_image_that_no_face_uses_may_be_missing(tmp_path: Path) -> None:
 def test_texture_without_coordinates(tmp_path: Path) -> None:
     Image.new("RGB", (2, 2)).save(tmp_path / "t.png")
     scene = scene_with(tmp_path, "newmtl m\nKd 0.3 0.3 0.3\nmap_Kd t.png\n", "usemtl m\nf 1 2 3\n")
-    assert scene.materials[0].albedo == (0.3, 0.3, 0.3)
+    assert scene.materials[0].base_color == (0.3, 0.3, 0.3)
     assert scene.geometry.uvs is None
     assert any("no texture coordinates" in note for note in scene.notes)
 
@@ -196,10 +198,10 @@ def test_map_ke_is_a_texture_of_emission(tmp_path: Path) -> None:
     scene = scene_with(
         tmp_path, mtl, "usemtl m\nf 1/1 2/2 3/3\n", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
     )
-    assert (scene.materials[0].texture, scene.materials[0].emission_texture) == (None, 0)
-    found = look_up_emission(
+    assert (scene.materials[0].base_color_texture, scene.materials[0].emission_texture) == (None, TextureRef(0))
+    found = SurfacePoints(
         scene.geometry, scene.materials, scene.textures, np.array([0, 0]), np.array([[0.75, 0.25, 0], [0.25, 0.75, 0]])
-    )
+    ).look_up_emission()
     assert found == pytest.approx(np.array([[2, 0, 0], [0, 0, 2.0]]))
     with pytest.raises(SceneError, match=r"image none\.png is missing"):
         scene_with(tmp_path, mtl.replace("glow", "none"))
@@ -240,7 +242,7 @@ def test_vertex_colours_are_srgb_and_multiply(tmp_path: Path) -> None:
     mesh = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], vertex_colors=levels, process=False)
     mesh.export(tmp_path / "model.ply")
     scene = scene_of(tmp_path / "model.ply")
-    assert scene.materials[0].albedo == (1.0, 1.0, 1.0)
+    assert scene.materials[0].base_color == (1.0, 1.0, 1.0)
     linear = np.vectorize(srgb)(levels[:, :3])
     assert scene.geometry.colors == pytest.approx(linear, rel=1e-6)
     weights = np.array([[0.2, 0.3, 0.5]])
@@ -251,9 +253,7 @@ def test_obj_vertex_colours_multiply_kd(tmp_path: Path) -> None:
     vertices = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 0.5\n"
     scene = scene_with(tmp_path, "newmtl m\nKd 0.5 0.5 0.5\n", "usemtl m\nf 1 2 3\n", vertices)
     assert scene.geometry.colors == pytest.approx(np.array([[1, 0, 0], [0, 1, 0], [0, 0, srgb(127.5)]]), rel=1e-6)
-    assert look_up_albedo(
-        scene.geometry, scene.materials, scene.textures, np.array([0]), np.array([[1.0, 0, 0]])
-    ) == pytest.approx(np.array([[0.5, 0, 0]]))
+    assert albedo_at(scene, np.array([0]), np.array([[1.0, 0, 0]])) == pytest.approx(np.array([[0.5, 0, 0]]))
 
 
 def test_face_colours(tmp_path: Path) -> None:

@@ -175,7 +175,8 @@ def test_faces_are_sorted_by_texture_and_vertices_by_model(tmp_path: Path) -> No
     second = write(tmp_path, f"mtllib m.mtl\n{TRIANGLE}{uv}usemtl b\n{face}usemtl k\n{face}", "2.obj")
     data = [(models.read(path), None) for path in (first, second)]
     mesh, materials, textures, ranges = merge.merge(data, "scene.toml")
-    order = [-1 if materials[index].texture is None else materials[index].texture for index in mesh.face_materials]
+    refs = [materials[index].base_color_texture for index in mesh.face_materials]
+    order = [-1 if ref is None else ref.number for ref in refs]  # index in mesh.face_materials]
     assert order == sorted(order)
     assert order.count(-1) == 2
     assert len(textures) == 2  # the same image in two files is one texture

@@ -110,7 +110,7 @@ def test_on_albedos_that_are_not_exact_in_8_bits(renderer, tmp_path):
     (tmp_path / "odd.mtl").write_text(ODD_MATERIALS)
     (tmp_path / "odd.toml").write_text(ODD_SCENE)
     scene = load(tmp_path / "odd.toml")
-    assert {material.albedo for material in scene.materials} == {
+    assert {material.base_color for material in scene.materials} == {
         (0.1234, 0.1234, 0.1234),
         (0.03, 0.1234, 0.7071),
         (0.9, 0.03, 0.333),

@@ -65,7 +65,7 @@ def test_a_step_of_albedo_is_an_edge_and_a_slight_one_is_not():
         # One material, with colours at its corners.
         colors = np.repeat([[0.5] * 3, other], 4, axis=0).astype("f4")
         geometry = replace(scene.geometry, colors=colors, face_materials=np.zeros(4, "i4"))
-        scene = replace(scene, geometry=geometry, materials=(replace(scene.materials[0], albedo=(1.0, 1.0, 1.0)),))
+        scene = replace(scene, geometry=geometry, materials=(replace(scene.materials[0], base_color=(1.0, 1.0, 1.0)),))
         points = on_floor(DOWN, SIZE)
         crossed = mixed(points[..., 0] > x)
         assert crossed.sum() == SIZE[1]

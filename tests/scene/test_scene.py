@@ -90,7 +90,9 @@ def changed():
         "normals": replace(base, geometry=replace(g, normals=np.zeros_like(g.positions, "f4"))),
         "uvs": replace(base, geometry=replace(g, uvs=g.uvs + 1)),
         "colours": replace(base, geometry=colored),
-        "an albedo": replace(base, materials=(replace(base.materials[0], albedo=(0.1, 0.2, 0.3)), *base.materials[1:])),
+        "an albedo": replace(
+            base, materials=(replace(base.materials[0], base_color=(0.1, 0.2, 0.3)), *base.materials[1:])
+        ),
         "a texel": replace(base, textures=(replace(base.textures[0], pixels=pixels),)),
         "a texture's shape": replace(
             base, textures=(replace(base.textures[0], pixels=base.textures[0].pixels.reshape(1, 4, 3)),)

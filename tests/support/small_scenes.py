@@ -11,9 +11,9 @@ import numpy as np
 
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.spotlight import Spotlight
-from deferred_ir.scene.materials import Material, Texture
 from deferred_ir.scene.motion import ModelMotion
 from deferred_ir.scene.scene import Geometry, Model, Scene
+from deferred_ir.scene.surfaces.materials import Material, Texture, TextureRef
 
 GREY = (0.5, 0.5, 0.5)
 FAR = (1e5, -2e5, 3e5)
@@ -132,7 +132,7 @@ def smooth_scene() -> Scene:
 def textured(scene: Scene, pixels: Any, uvs: Any) -> Scene:
     """`scene`, whose last material gets an image texture; uvs: (V, 2) of all vertices."""
     geometry = replace(scene.geometry, uvs=np.asarray(uvs, "f4"))
-    last = replace(scene.materials[-1], texture=0)
+    last = replace(scene.materials[-1], base_color_texture=TextureRef(0))
     pattern = Texture("pattern", np.asarray(pixels, np.uint8))
     return replace(scene, geometry=geometry, materials=(*scene.materials[:-1], last), textures=(pattern,))
 

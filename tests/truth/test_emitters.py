@@ -18,6 +18,7 @@ from deferred_ir.scene.lights.point import Point
 from deferred_ir.scene.lights.rect import Rect
 from deferred_ir.scene.lights.sphere import Sphere
 from deferred_ir.scene.lights.spot import Spot
+from deferred_ir.scene.surfaces.materials import TextureRef
 from deferred_ir.truth.path_tracer import PathTracer
 from deferred_ir.truth.reference import trace_reference
 
@@ -191,8 +192,9 @@ def make_panel(*, down=True, both=False, pixels=None):
     if pixels is not None:
         uvs = np.concatenate([np.zeros((4, 2)), [(c[0] / 0.8 + 0.375, 0.5) for c in corners]])
         scene = textured(scene, pixels, uvs)
-    texture = None if pixels is None else 0
-    shining = replace(scene.materials[1], texture=None, emission=RGB, emission_texture=texture, emits_both_sides=both)
+    texture = None if pixels is None else TextureRef(0)
+    shining = replace(scene.materials[1], base_color_texture=None, emission=RGB)
+    shining = replace(shining, emission_texture=texture, emits_both_sides=both)
     return replace(scene, materials=(scene.materials[0], shining), lights=()), np.array(corners)
 
 

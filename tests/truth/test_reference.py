@@ -119,7 +119,7 @@ def make_sphere_scene(albedo, radius=1.5):
 
 def compute_first_bounce(scene, radius=1.5):
     """Return the first bounce's radiance inside a sphere: the power, spread evenly, times albedo, twice over pi."""
-    light, rho = scene.spotlight, scene.materials[0].albedo[0]
+    light, rho = scene.spotlight, scene.materials[0].base_color[0]
     edge = np.cos(np.radians(light.fov / 2))
     cosine = np.linspace(edge, 1, 200001)
     cone = np.clip(4 * (cosine - edge) / (1 - edge), 0, 1)

@@ -22,8 +22,9 @@ from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import SceneError, format_value
 from deferred_ir.loading.asset_paths import Assets
 from deferred_ir.loading.formats import gltf_checks
-from deferred_ir.loading.formats.model_format import Emission, ModelFormat, Reflectance, choose_plain_albedo
+from deferred_ir.loading.formats.model_format import FileImage, FileMaterial, ModelFormat, choose_plain_albedo
 from deferred_ir.loading.model_data import check_albedo, check_emission
+from deferred_ir.scene.surfaces.materials import Material
 
 STRENGTH = "KHR_materials_emissive_strength"
 TRIANGLES, STRIP, FLOAT, REPEAT = 4, 5, 5126, 10497
@@ -70,7 +71,7 @@ class GltfFile:
 class GltfFormat(ModelFormat):
     """A glTF file. Base colours and vertex colours are linear, and textures multiply them."""
 
-    image_replaces_albedo = False
+    image_replaces_color = False
 
     def __init__(self, path: Path, data: bytes, root: Path | None) -> None:
         file = read(path, data, root)
@@ -78,27 +79,25 @@ class GltfFormat(ModelFormat):
         self.notes += file.notes
         self._materials, self._glows = file.materials, file.glows
 
-    def read_reflectance(self, material: Any, colored: bool) -> Reflectance:
-        """Return the base colour of the file's material, whose index is the name of trimesh's."""
+    def read_material(self, material: Any, colored: bool) -> FileMaterial:
+        """Return the file's material, whose index is the name of trimesh's."""
         if material is None:
-            return Reflectance("default", choose_plain_albedo(colored))
-        base = self._materials[int(material.name)]
-        where, image = f"{self.path}: material {base.name}", material.baseColorTexture
-        if base.image is not None and image is None:
-            raise SceneError(f"{where}: image {base.image} is missing or not readable; put it next to the model")
-        return Reflectance(base.name, check_albedo(base.factor, where, self.notes), image, base.image or "")
-
-    def read_emission(self, material: Any) -> Emission:
-        """Return what the file's material emits: without doubleSided, from the front of its faces."""
-        if material is None:
-            return Emission()
-        glow, base = self._glows[int(material.name)], self._materials[int(material.name)]
-        where, image = f"{self.path}: material {base.name}", material.emissiveTexture
-        if glow.image is None:
-            image = None
-        elif image is None:
-            raise SceneError(f"{where}: image {glow.image} is missing or not readable; put it next to the model")
-        return Emission(check_emission(glow.factor, where), image, glow.image or "", glow.both_sides)
+            return FileMaterial(Material("default", choose_plain_albedo(colored)))
+        base, glow = self._materials[int(material.name)], self._glows[int(material.name)]
+        where = f"{self.path}: material {base.name}"
+        albedo, radiance = check_albedo(base.factor, where, self.notes), check_emission(glow.factor, where)
+        found = Material(base.name, albedo, emission=radiance, emits_both_sides=glow.both_sides)
+        wanted = {
+            "base_color": (base.image, material.baseColorTexture),
+            "emission": (glow.image, material.emissiveTexture),
+        }
+        images = {}
+        for slot, (name, image) in wanted.items():
+            if name is not None and image is None:
+                raise SceneError(f"{where}: image {name} is missing or not readable; put it next to the model")
+            if image is not None and (name or slot == "base_color"):
+                images[slot] = FileImage(image, name or "")
+        return FileMaterial(found, images)
 
     def decode_colors(self, values: Array) -> Array:
         """Return stored colours, which are linear, cut to 1."""

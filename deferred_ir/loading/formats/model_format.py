@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,26 +14,22 @@ from deferred_ir.base.colour import linear_from_srgb
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading.asset_paths import Assets
 from deferred_ir.loading.model_data import GREY
+from deferred_ir.scene.surfaces.materials import WHITE, Material, TextureRef
 
-WHITE = (1.0, 1.0, 1.0)
 
+class FileImage(NamedTuple):
+    """A PIL image and its name; `use` says how the material reads it, but for its number."""
 
-class Reflectance(NamedTuple):
-    """A material's name, its albedo (linear), its PIL image or None, and the image's name."""
-
+    image: Any
     name: str
-    albedo: Vec3
-    image: Any = None
-    image_name: str = ""
+    use: TextureRef = TextureRef(0)
 
 
-class Emission(NamedTuple):
-    """What a material emits: radiance (linear RGB), its PIL image or None, the image's name, and from which sides."""
+class FileMaterial(NamedTuple):
+    """A material without its textures, and the images of these by slot (`materials.SLOTS`)."""
 
-    radiance: Vec3 = (0.0, 0.0, 0.0)
-    image: Any = None
-    image_name: str = ""
-    both_sides: bool = False
+    material: Material
+    images: Mapping[str, FileImage] = {}
 
 
 class ModelFormat(ABC):
@@ -41,24 +38,19 @@ class ModelFormat(ABC):
     data, file_type, assets: what trimesh reads. notes: what of the file is not honoured.
     """
 
-    image_replaces_albedo = True
-    """Whether a texture stands for the whole reflectance; else it multiplies the albedo."""
+    image_replaces_color = True
+    """Whether a texture stands for the whole base colour; else it multiplies that of the material."""
 
     def __init__(self, path: Path, data: bytes, file_type: str, assets: Assets) -> None:
         self.path, self.data, self.file_type, self.assets = path, data, file_type, assets
         self.notes: list[str] = []
 
     @abstractmethod
-    def read_reflectance(self, material: Any, colored: bool) -> Reflectance:
+    def read_material(self, material: Any, colored: bool) -> FileMaterial:
         """Read a material of trimesh, None for a mesh without one. colored: the mesh has colours of its own.
 
         Raises SceneError where an image that the file names is missing or broken.
         """
-
-    def read_emission(self, material: Any) -> Emission:
-        """Read what a material of trimesh, None for a mesh without one, emits. Raises SceneError as above."""
-        del material
-        return Emission()
 
     def read_colors(self, mesh: Any) -> Array | None:
         """Read linear colours of a mesh's vertices, else of its faces, float64 (n, 3); None if it has none."""

@@ -14,8 +14,9 @@ from typing import Any
 
 from deferred_ir.base.errors import SceneError
 from deferred_ir.loading.asset_paths import Assets, strip_options
-from deferred_ir.loading.formats.model_format import WHITE, Emission, ModelFormat, Reflectance, choose_plain_albedo
+from deferred_ir.loading.formats.model_format import FileImage, FileMaterial, ModelFormat, choose_plain_albedo
 from deferred_ir.loading.model_data import check_albedo, check_emission
+from deferred_ir.scene.surfaces.materials import WHITE, Material
 
 MATERIALS = "materials.mtl"
 """Name under which all materials of a model are handed to trimesh."""
@@ -51,11 +52,11 @@ class ObjFormat(ModelFormat):
         self._materials = file.materials
         self._images: dict[str, Any] = {}
 
-    def read_reflectance(self, material: Any, colored: bool) -> Reflectance:
-        """Return Kd, unrounded, and map_Kd of the file's material of that name."""
+    def read_material(self, material: Any, colored: bool) -> FileMaterial:
+        """Return Kd, unrounded, Ke and the images map_Kd and map_Ke of the file's material of that name."""
         plain = choose_plain_albedo(colored)
         if material is None:
-            return Reflectance("default", plain)
+            return FileMaterial(Material("default", plain))
         image = self.find_image(material)
         fills_in = image is None and getattr(material, "image", None) is not None
         known = MtlMaterial() if fills_in else self._materials.get(material.name, MtlMaterial())
@@ -63,17 +64,18 @@ class ObjFormat(ModelFormat):
         if material.name in self._materials and not known.kd and image is None:
             self.notes.append(f"{self.path.name}: material {material.name} has no Kd that can be read; it is grey")
         albedo = check_albedo(known.kd, self.locate(material), self.notes) if known.kd else plain
-        return Reflectance(material.name, albedo, image, known.image or f"texture of {material.name}")
-
-    def read_emission(self, material: Any) -> Emission:
-        """Return Ke, which both sides of a face emit, times map_Ke; an image alone counts as it is."""
-        known = self._materials.get(material.name) if material is not None else None
-        if known is None or not (known.ke or known.glow):
-            return Emission()
-        radiance = check_emission(known.ke or WHITE, self.locate(material))
-        if not any(radiance) or known.glow is None:
-            return Emission(radiance, both_sides=True)
-        return Emission(radiance, self._open_image(material, known.glow), known.glow, both_sides=True)
+        found = Material(material.name, albedo)
+        images = {}
+        if image is not None:
+            images["base_color"] = FileImage(image, known.image or f"texture of {material.name}")
+        known = self._materials.get(material.name, MtlMaterial())
+        if known.ke or known.glow:
+            # An image alone counts as it is.
+            radiance = check_emission(known.ke or WHITE, self.locate(material))
+            found = replace(found, emission=radiance, emits_both_sides=True)
+            if any(radiance) and known.glow is not None:
+                images["emission"] = FileImage(self._open_image(material, known.glow), known.glow)
+        return FileMaterial(found, images)
 
     def _open_image(self, material: Any, name: str) -> Any:
         from PIL import Image

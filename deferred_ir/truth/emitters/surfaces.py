@@ -138,7 +138,7 @@ class EmittingSurfaces:
             if image is not None and geometry.uvs is not None:
                 rows = np.flatnonzero(numbers == number)
                 uvs = np.einsum("ni,nij->nj", weights[rows], geometry.uvs[geometry.faces[faces[rows]]].astype(float))
-                radiance[rows] *= _look_up_texture(self.scene.textures[image].pixels, uvs)
+                radiance[rows] *= _look_up_texture(self.scene.textures[image.number].pixels, uvs)
         return radiance
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from deferred_ir.base.arrays import Array
 from deferred_ir.loading.models import move_uvs_home
 from deferred_ir.profiling.checks.changes.triangles import with_geometry
-from deferred_ir.scene.materials import Texture
 from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.surfaces.materials import Texture, TextureRef
 
 GREY = 188
 """An sRGB value, about one half in linear light."""
@@ -18,7 +18,9 @@ GREY = 188
 
 def with_albedo(scene: Scene, albedo: float) -> Scene:
     """Give all surfaces one reflectance, without textures and colours."""
-    materials = tuple(replace(material, albedo=(albedo,) * 3, texture=None) for material in scene.materials)
+    materials = tuple(
+        replace(material, base_color=(albedo,) * 3, base_color_texture=None) for material in scene.materials
+    )
     return with_geometry(replace(scene, materials=materials, textures=()), colors=None, uvs=None)
 
 
@@ -33,6 +35,8 @@ def _separate_faces(scene: Scene, normals: Array | None) -> Scene:
         normals=None if normals is None else normals.astype(np.float32),
         uvs=None if g.uvs is None else g.uvs[corners],
         colors=None if g.colors is None else g.colors[corners],
+        second_uvs=None if g.second_uvs is None else g.second_uvs[corners],
+        tangents=None if g.tangents is None else g.tangents[corners],
     )
 
 
@@ -74,7 +78,7 @@ def _with_texture(scene: Scene, pixels: Array, shift: float) -> Scene:
     uvs = move_uvs_home((plain.geometry.positions - plain.geometry.bounds[0])[:, :2] / plain.geometry.diagonal + shift)
     paper = replace(
         plain,
-        materials=tuple(replace(material, texture=0) for material in plain.materials),
+        materials=tuple(replace(material, base_color_texture=TextureRef(0)) for material in plain.materials),
         textures=(Texture("paper", pixels),),
     )
     return with_geometry(paper, uvs=uvs.astype(np.float32))

@@ -35,6 +35,8 @@ def add_triangles(scene: Scene, positions: Array, faces: Ints) -> Scene:
         normals=extend(g.normals, np.zeros(3)),
         uvs=extend(g.uvs, None if g.uvs is None else g.uvs[first]),
         colors=extend(g.colors, np.ones(3)),
+        second_uvs=extend(g.second_uvs, None if g.second_uvs is None else g.second_uvs[first]),
+        tangents=extend(g.tangents, np.zeros(4)),
     )
     return replace(scene, geometry=geometry)
 
@@ -104,6 +106,8 @@ def split_faces(scene: Scene, fraction: float, whole: bool = False) -> Scene:
         normals=None if g.normals is None else cut(g.normals),
         uvs=None if g.uvs is None else cut(g.uvs),
         colors=None if g.colors is None else cut(g.colors),
+        second_uvs=None if g.second_uvs is None else cut(g.second_uvs),
+        tangents=None if g.tangents is None else cut(g.tangents),
     )
 
 

@@ -1,0 +1,1 @@
+"""Materials, their textures, and how surfaces reflect."""

@@ -17,7 +17,8 @@ from deferred_ir.frame.direct_lights import LIGHTS_PER_BLOCK
 from deferred_ir.frame.frame import Frame, describe_environment
 from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
-from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK
+from deferred_ir.frame.uploads.mipmaps import MipmapParams
+from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK, find_spread
 from deferred_ir.gl.shaders import Define
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
@@ -30,7 +31,7 @@ FIRST_MAP = 1
 
 
 @dataclass(frozen=True)
-class Params(ShadowFilter):
+class Params(MipmapParams, ShadowFilter):
     """Parameters of the baseline."""
 
     lights_per_draw: int = param(1, lo=1, hi=8, doc="VPLs that one draw of the scene adds up.")
@@ -83,7 +84,8 @@ class Forward(Pass):
     def _draw_emission(self, frame: Frame, io: Io, defines: Mapping[str, Define]) -> None:
         """Draw what shines itself: surfaces, and what is behind them."""
         if frame.scene.shows_emission:
-            frame.buffers.draw(io.program("forward_emission.frag", "scene.vert", defines=defines))
+            program = io.program("forward_emission.frag", "scene.vert", defines=defines)
+            frame.buffers.draw(program, mipmaps=self.params.mipmaps)
         if io["environment"]:
             program = io.program("background.frag")
             program.set(**describe_environment(frame.scene))
@@ -101,7 +103,7 @@ class Forward(Pass):
             lights.bind(block)
             program.set(number=own)
             if views is None:
-                frame.buffers.draw(program)
+                frame.buffers.draw(program, mipmaps=self.params.mipmaps)
                 continue
             views.bind(block)
             for view in np.flatnonzero(described.owners == number).tolist():
@@ -109,7 +111,7 @@ class Forward(Pass):
                 if io["blockers"]:
                     io["blockers"][view].bind(FIRST_MAP + 1, io.gpu.sampler(linear=False))
                 program.set(view_number=int(described.rows[view]) % views.description.block)
-                frame.buffers.draw(program)
+                frame.buffers.draw(program, mipmaps=self.params.mipmaps)
 
     def _draw_vpls(self, frame: Frame, io: Io, defines: Mapping[str, Define], compare: Any) -> None:
         vpls, group = io["vpls"], self.params.lights_per_draw
@@ -121,7 +123,9 @@ class Forward(Pass):
             vpls.bind(int(rows[0]) // VPLS_PER_BLOCK)
             numbers = np.resize(rows % VPLS_PER_BLOCK, group).tolist()
             program.set(numbers=numbers if group > 1 else numbers[0], count=len(rows))
-            frame.buffers.draw(program)
+            if frame.scene.has_gloss:
+                program.set(vpl_spread=find_spread(vpls.records))
+            frame.buffers.draw(program, mipmaps=self.params.mipmaps)
 
 
 def _groups(vpls: np.ndarray, size: int) -> Iterator[Ints]:

@@ -15,7 +15,7 @@ from deferred_ir.frame.frame import Frame, describe_environment
 from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.screen_tiles import TILES, count_pairs
-from deferred_ir.frame.vpl_buffer import BINDING, VPL, VPLS_PER_BLOCK
+from deferred_ir.frame.vpl_buffer import BINDING, VPL, VPLS_PER_BLOCK, find_spread
 from deferred_ir.gl.shaders import Program
 from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.pass_base import Pass
@@ -45,6 +45,7 @@ class Lighting(Pass):
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
         "albedo": Input("reflectance", format="rgba16f"),
+        "material": Input("roughness, metallic and material", format="rgba16", optional=True),
         "emission": Input("what surfaces emit", format="rgba32f", optional=True),
         "environment": Input("what shows behind everything", format="rgba32f", optional=True),
         "tiles": Input("which VPLs may light which tiles of the screen", format="rg32ui", optional=True),
@@ -81,12 +82,15 @@ class Lighting(Pass):
         defines = shader_variants.choose_for_pixels(frame, vpls) | self.params.defines()
         defines |= shader_variants.choose_for_lights(frame, lights, views)
         culled = io["tiles"] is not None and not frame.keep_all
-        program = io.program("lighting.frag", defines=defines | {"HAS_TILES": int(culled)})
+        defines |= {"HAS_TILES": int(culled), "GLOSSY": int(io["material"] is not None)}
+        program = io.program("lighting.frag", defines=defines)
         io.gpu.ctx.blend_func = io.gpu.ctx.ONE, io.gpu.ctx.ONE
         if io["indirect"]:
             vpls = vpls[:0]
             if io["blend"]:
                 program.set(offset=read_layout(io).offset)
+        if io["material"]:
+            program.set(vpl_spread=find_spread(io["vpls"].records))
         if io["environment"]:
             program.set(**describe_environment(frame.scene))
         draws = _Draws(io, program)

@@ -14,10 +14,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from deferred_ir.base.arrays import Ints
-from deferred_ir.frame.cluster_buffers import ClusterBuffers
 from deferred_ir.frame.facts import DIRECT_LIGHTS, EMITS, VIEWS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.uploads.cluster_buffers import ClusterBuffers
 from deferred_ir.graph.facts import NOTHING_KNOWN, Facts, Statements
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Buffer, Description, Input, Output, Texture

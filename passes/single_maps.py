@@ -10,11 +10,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir.frame.cluster_buffers import ClusterBuffers
 from deferred_ir.frame.facts import DIRECT_LIGHTS, EMITS, VIEWS
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.uploads.cluster_buffers import ClusterBuffers
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.graph.facts import NOTHING_KNOWN, Facts
 from deferred_ir.graph.pass_base import Pass

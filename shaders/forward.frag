@@ -1,6 +1,7 @@
 // Radiance from one direct light, or from LIGHTS_PER_DRAW VPLs or fewer, each with a depth map of its own; blending adds
 // up the draws.
 #include "lib/surface/surface.glsl"
+#include "lib/surface/reflected.glsl"
 #include "lib/lights/direct.glsl"
 #include "lib/lights/vpl.glsl"
 #if HAS_LIGHT_MAPS && HAS_VPL_MAPS
@@ -22,6 +23,9 @@ layout(binding = UNIT_MAPS) uniform sampler2DShadow vpl_maps[LIGHTS_PER_DRAW];
 uniform int number;       // of the light in its block
 uniform int view_number;  // of the bound map's view, which adds its light where it looks
 #else
+#if GLOSSY
+uniform float vpl_spread;  // see reflect_light
+#endif
 uniform int numbers[LIGHTS_PER_DRAW];  // of this draw's VPLs, in this block
 uniform int count;
 #endif
@@ -31,16 +35,31 @@ layout(location = 0) out vec4 radiance;
 void main() {
     if (texelFetch(primitives, ivec2(gl_FragCoord.xy), 0).r != uint(face_number() + 1)) discard;
     Surface s = surface();
-    vec3 irradiance = vec3(0.0);
+    Pixel p;
+    p.position = s.position;
+    p.normal = s.normal;
+    p.shading_normal = s.shading_normal;
+    vec3 color = s.albedo;
+#if GLOSSY
+    p.to_viewer = normalize(frame.camera - s.position);
+    p.gloss = make_gloss(s.material, s.albedo, s.metallic, s.roughness, color);
+#endif
+    Reflected r = nothing_reflected();
 #if DIRECT
 #if HAS_LIGHT_MAPS
     if (choose_view(lights[number], s.position) != view_number) discard;
 #endif
-    irradiance = light_irradiance(lights[number], s.position, s.normal, s.shading_normal);
+    vec3 arriving = light_irradiance(lights[number], s.position, s.normal, s.shading_normal);
 #if HAS_LIGHT_MAPS && HAS_BLOCKERS && SOFT && DISC
-    irradiance *= light_visibility(light_maps, blockers, lights[number], s.position, s.normal);
+    arriving *= light_visibility(light_maps, blockers, lights[number], s.position, s.normal);
 #elif HAS_LIGHT_MAPS
-    irradiance *= light_visibility(light_maps, lights[number], s.position, s.normal);
+    arriving *= light_visibility(light_maps, lights[number], s.position, s.normal);
+#endif
+#if GLOSSY
+    vec3 to = way_to(lights[number], s.position);
+    reflect_light(r, p, arriving, to, light_spread(lights[number], to));
+#else
+    r.irradiance = arriving;
 #endif
 #else
     for (int i = 0; i < LIGHTS_PER_DRAW; ++i) {
@@ -49,9 +68,13 @@ void main() {
 #if HAS_VPL_MAPS
         arriving *= vpl_visibility(vpl_maps[i], vpls[numbers[i]], s.position, s.normal);
 #endif
-        irradiance += arriving;
+#if GLOSSY
+        reflect_light(r, p, arriving, -way_from(vpls[numbers[i]], s.position), vpl_spread);
+#else
+        r.irradiance += arriving;
+#endif
     }
 #endif
-    radiance = vec4(s.albedo * irradiance * INVERSE_PI, 1.0);
+    radiance = vec4(reflected_radiance(r, color), 1.0);
     WRITE_DEPTH(frame.near);
 }

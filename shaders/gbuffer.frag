@@ -13,7 +13,14 @@ layout(location = TARGET_ALBEDO) out vec4 albedo;
 layout(location = TARGET_EMISSION) out vec4 emission;
 #endif
 
+#ifdef TARGET_MATERIAL
+layout(location = TARGET_MATERIAL) out vec4 material;
+#endif
+
 void main() {
+#if CUT
+    if (is_cut()) discard;
+#endif
     Surface s = surface();
 #ifdef TARGET_NORMALS
     normals = encode_normals(s.shading_normal, s.normal);
@@ -23,6 +30,9 @@ void main() {
 #endif
 #ifdef TARGET_EMISSION
     emission = vec4(emitted(), 1.0);
+#endif
+#ifdef TARGET_MATERIAL
+    material = encode_material(s.roughness, s.metallic, s.material);
 #endif
     WRITE_DEPTH(frame.near);
 }

@@ -1,5 +1,5 @@
 // Radiance from the direct lights and one block of VPLs; further blocks are added by blending.
-#include "lib/surface/pixel.glsl"
+#include "lib/surface/reflected.glsl"
 #include "lib/lights/direct.glsl"
 #include "lib/lights/vpl.glsl"
 #if HAS_SHADOWS
@@ -21,6 +21,9 @@ uniform int block;  // number of the bound block of VPLs
 layout(binding = UNIT_DEPTH) uniform sampler2D depth;
 layout(binding = UNIT_NORMALS) uniform sampler2D normals;
 layout(binding = UNIT_ALBEDO) uniform sampler2D albedo;
+#if HAS_MATERIAL
+layout(binding = UNIT_MATERIAL) uniform sampler2D material;
+#endif
 #if HAS_EMISSION
 layout(binding = UNIT_EMISSION) uniform sampler2D emission;
 #endif
@@ -47,6 +50,9 @@ layout(binding = UNIT_NEAR_FIELD) uniform sampler2D near_field;
 uniform bool first;       // draw of a pixel
 uniform int light_count;  // of the block
 uniform int count;        // VPLs of the block, where they are not in `indirect` already
+#if GLOSSY
+uniform float vpl_spread;  // see reflect_light
+#endif
 
 in vec2 ndc;
 layout(location = 0) out vec4 radiance;
@@ -69,8 +75,22 @@ float visibility(Vpl vpl, Pixel p) {
 #endif
 }
 
-vec3 irradiance_of(Vpl vpl, Pixel p) {
-    return vpl_irradiance(vpl, p.position, p.normal, p.shading_normal) * visibility(vpl, p);
+void add_vpl(inout Reflected r, Vpl vpl, Pixel p) {
+    vec3 arriving = vpl_irradiance(vpl, p.position, p.normal, p.shading_normal) * visibility(vpl, p);
+#if GLOSSY
+    reflect_light(r, p, arriving, -way_from(vpl, p.position), vpl_spread);
+#else
+    r.irradiance += arriving;
+#endif
+}
+
+void add_light(inout Reflected r, DirectLight light, vec3 arriving, Pixel p) {
+#if GLOSSY
+    vec3 to = way_to(light, p.position);
+    reflect_light(r, p, arriving, to, light_spread(light, to));
+#else
+    r.irradiance += arriving;
+#endif
 }
 
 void main() {
@@ -85,42 +105,47 @@ void main() {
         return;
     }
     Pixel p = read_pixel(normals, pixel, ndc, d);
-    vec3 irradiance = vec3(0.0);
+    vec3 color = texelFetch(albedo, pixel, 0).rgb;
+    Reflected r = nothing_reflected();
+#if GLOSSY
+    read_gloss(p, texelFetch(material, pixel, 0), color);
+#endif
 #if HAS_DIRECT
 #if DIRECT_OVER_EMISSION
-    if (first) irradiance = lights[0].emission * texelFetch(direct, pixel, 0).r;
+    if (first) add_light(r, lights[0], lights[0].emission * texelFetch(direct, pixel, 0).r, p);
 #else
-    if (first) irradiance = texelFetch(direct, pixel, 0).rgb;
+    if (first) reflect_irradiance(r, p, texelFetch(direct, pixel, 0).rgb);
 #endif
 #else
     for (int i = 0; i < min(light_count, LIGHTS_PER_BLOCK); ++i)  // of a known bound: a loop of one is none
-        irradiance += light_irradiance(lights[i], p.position, p.normal, p.shading_normal) * visibility(lights[i], p);
+        add_light(r, lights[i],
+                  light_irradiance(lights[i], p.position, p.normal, p.shading_normal) * visibility(lights[i], p), p);
 #endif
 #if HAS_INDIRECT  // with the near field in it
 #if HAS_BLEND && SCALE > 1
-    irradiance += blended(indirect, texelFetch(blend, pixel, 0).r, pixel, offset);
+    reflect_irradiance(r, p, blended(indirect, texelFetch(blend, pixel, 0).r, pixel, offset));
 #else
-    irradiance += texelFetch(indirect, pixel, 0).rgb;
+    reflect_irradiance(r, p, texelFetch(indirect, pixel, 0).rgb);
 #endif
 #if HAS_LONELY
-    irradiance += texelFetch(lonely, pixel, 0).rgb;
+    reflect_irradiance(r, p, texelFetch(lonely, pixel, 0).rgb);
 #endif
 #else
 #if HAS_NEAR_FIELD
-    if (first) irradiance += texelFetch(near_field, pixel, 0).rgb;
+    if (first) reflect_irradiance(r, p, texelFetch(near_field, pixel, 0).rgb);
 #endif
 #if HAS_TILES  // only VPLs that may light the tile, in their order
     ivec2 tile = tile_of(pixel, textureSize(depth, 0));
     for (int first = 0; first < count; first += LIGHT_GROUP) {
         uvec2 lit = texelFetch(tiles, tile_texel(tile, block, first), 0).rg;
-        for (; lit.x != 0u; lit.x &= lit.x - 1u) irradiance += irradiance_of(vpls[first + findLSB(lit.x)], p);
-        for (; lit.y != 0u; lit.y &= lit.y - 1u) irradiance += irradiance_of(vpls[first + 32 + findLSB(lit.y)], p);
+        for (; lit.x != 0u; lit.x &= lit.x - 1u) add_vpl(r, vpls[first + findLSB(lit.x)], p);
+        for (; lit.y != 0u; lit.y &= lit.y - 1u) add_vpl(r, vpls[first + 32 + findLSB(lit.y)], p);
     }
 #else
-    for (int i = 0; i < count; ++i) irradiance += irradiance_of(vpls[i], p);
+    for (int i = 0; i < count; ++i) add_vpl(r, vpls[i], p);
 #endif
 #endif
-    radiance = vec4(texelFetch(albedo, pixel, 0).rgb * irradiance * INVERSE_PI, 1.0);
+    radiance = vec4(reflected_radiance(r, color), 1.0);
 #if HAS_EMISSION
     if (first) radiance.rgb += texelFetch(emission, pixel, 0).rgb;
 #endif

@@ -14,6 +14,14 @@ out vec3 vertex_color;
 in vec2 uv;
 out vec2 texture_uv;
 #endif
+#if HAS_SECOND_UVS
+in vec2 second_uv;
+out vec2 second_texture_uv;
+#endif
+#if HAS_TANGENTS
+in vec4 tangent;
+out vec4 world_tangent;
+#endif
 out vec3 world_position;
 invariant gl_Position;  // a prepass and the passes that test against it must agree to the last bit
 
@@ -27,6 +35,12 @@ void main() {
 #endif
 #if HAS_UVS
     texture_uv = uv;
+#endif
+#if HAS_SECOND_UVS
+    second_texture_uv = second_uv;
+#endif
+#if HAS_TANGENTS
+    world_tangent = tangent;
 #endif
     gl_Position = project(position);
 }

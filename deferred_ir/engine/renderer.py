@@ -21,7 +21,7 @@ from deferred_ir.engine.settings import DEFAULT_GRAPH
 from deferred_ir.engine.setup import IMAGES, Setup, check_images
 from deferred_ir.frame.facts import collect_facts
 from deferred_ir.frame.frame import PARTS, Frame
-from deferred_ir.frame.scene_buffers import SceneBuffers
+from deferred_ir.frame.uploads.scene_buffers import SceneBuffers
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.devices import Loader
 from deferred_ir.gl.timers import Timers

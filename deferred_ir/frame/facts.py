@@ -23,6 +23,7 @@ ENVIRONMENT = Fact[tuple[int, int] | None](
     doc="Size of the image of light from all around; None without.",
 )
 EMISSION = Fact("emission", unknown=True, doc="Surfaces are seen to emit.")
+GLOSS = Fact("gloss", unknown=True, doc="Surfaces are glossy.")
 SOFTWARE = Fact("software", unknown=True, doc="OpenGL draws on the CPU.")
 
 
@@ -38,6 +39,7 @@ def collect_facts(scene: Scene, size: tuple[int, int] | None = None, *, software
             SAMPLED: bool(scene.sampled_lights),
             ENVIRONMENT: scene.environment.size if scene.environment else None,
             EMISSION: scene.shows_emission,
+            GLOSS: scene.has_gloss,
             TRIANGLES: len(scene.geometry.faces),
         }
     )

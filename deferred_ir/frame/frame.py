@@ -13,7 +13,7 @@ import numpy as np
 from deferred_ir.base.arrays import Vec3
 from deferred_ir.frame.direct_lights import DescribedViews, describe_views
 from deferred_ir.frame.light_culling import SeenClusters, find_seen_clusters
-from deferred_ir.frame.scene_buffers import SceneBuffers
+from deferred_ir.frame.uploads.scene_buffers import SceneBuffers
 from deferred_ir.gl.textures import GpuTexture
 from deferred_ir.rays.pixel_surfaces import Surfaces, decode_gbuffer, decode_samples
 from deferred_ir.rays.tracer import Tracer

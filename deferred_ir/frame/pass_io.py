@@ -15,12 +15,13 @@ from deferred_ir.graph.graph import Step
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Output
 from deferred_ir.graph.stages import SUFFIXES, find_stage
+from deferred_ir.scene.surfaces.materials import SLOTS
 
 NO_DEFINES: Mapping[str, Define] = {}
 Resource = GpuTexture | GpuBuffer | list[GpuTexture]
 Meta = TypeVar("Meta")
 Rectangle = tuple[int, int, int, int]
-SCENE_SAMPLERS = {"albedo_texture", "emission_texture"}
+SCENE_SAMPLERS = {f"{slot}_texture" for slot in SLOTS}
 """Samplers that SceneBuffers binds; all others must be ports."""
 
 

@@ -9,6 +9,9 @@ from typing import Any
 from deferred_ir.gl import devices, raw
 from deferred_ir.gl.debug import SWITCH, DebugOutput
 from deferred_ir.gl.devices import Loader
+from deferred_ir.gl.formats import ImageSampler
+
+MOST_ANISOTROPIC = 16
 
 
 class Gpu:
@@ -31,7 +34,7 @@ class Gpu:
             self.gl.ClipControl(raw.LOWER_LEFT, raw.ZERO_TO_ONE)
         self._clipped = 0
         self._uniforms: Any = None
-        self._samplers: dict[tuple[bool, str | None, bool], Any] = {}
+        self._samplers: dict[Any, Any] = {}
 
     @property
     def driver(self) -> str:
@@ -54,15 +57,23 @@ class Gpu:
         """Defines that tell shaders what the driver can do."""
         return {"CLIP_CONTROL": int(self.clip_control), "LAYER_FROM_VERTEX": int(self.layer_from_vertex)}
 
-    def sampler(self, linear: bool, compare: str | None = None, repeat: bool = False) -> Any:
+    def sampler(self, linear: bool, compare: str | None = None) -> Any:
         """Return a shared sampler object: filter and comparison belong to the reader, never to the texture."""
-        key = (linear, compare, repeat)
+        key = linear, compare
         if key not in self._samplers:
             name = self.ctx.LINEAR if linear else self.ctx.NEAREST
-            sampler = self.ctx.sampler(repeat_x=repeat, repeat_y=repeat, filter=(name, name))
+            sampler = self.ctx.sampler(repeat_x=False, repeat_y=False, filter=(name, name))
             if compare:
                 sampler.compare_func = compare
             self._samplers[key] = sampler
+        return self._samplers[key]
+
+    def image_sampler(self, magnify: str, minify: str, levels: str | None, wrap: tuple[str, str]) -> Any:
+        """Return a shared ImageSampler; filters over levels are anisotropic where the driver can."""
+        key = magnify, minify, levels, wrap
+        if key not in self._samplers:
+            most = int(min(MOST_ANISOTROPIC, self.ctx.max_anisotropy))
+            self._samplers[key] = ImageSampler(self.gl, magnify, minify, levels, wrap=wrap, anisotropy=most)
         return self._samplers[key]
 
     def reset(self) -> None:

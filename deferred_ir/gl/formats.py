@@ -1,10 +1,14 @@
-"""Texture formats by name, with OpenGL's enumerants."""
+"""Texture formats, filters and wrap modes by name, with OpenGL's enumerants, and samplers of images.
+
+moderngl's samplers cannot mirror.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from deferred_ir.gl import raw
+from deferred_ir.gl.raw import GL
 
 
 @dataclass(frozen=True)
@@ -36,3 +40,40 @@ FORMATS = {
     "depth32f": Format(raw.DEPTH_COMPONENT32F, raw.DEPTH_COMPONENT, raw.FLOAT, 1, "f4", 4),
 }
 """Formats by the names that ports use; `rgba16` and `rgba8` are normalised integers."""
+WRAPS = {"repeat": raw.REPEAT, "mirror": raw.MIRRORED_REPEAT, "clamp": raw.CLAMP_TO_EDGE}
+FILTERS = {
+    ("nearest", None): raw.NEAREST,
+    ("linear", None): raw.LINEAR,
+    ("nearest", "nearest"): raw.NEAREST_MIPMAP_NEAREST,
+    ("linear", "nearest"): raw.LINEAR_MIPMAP_NEAREST,
+    ("nearest", "linear"): raw.NEAREST_MIPMAP_LINEAR,
+    ("linear", "linear"): raw.LINEAR_MIPMAP_LINEAR,
+}
+"""By the filter within a level and that between levels."""
+
+
+class ImageSampler:
+    """How an image is read: filters, and what lies beyond its edges.
+
+    magnify, minify, levels: "nearest" or "linear"; levels: None for level 0 alone. wrap: "repeat", "mirror" or "clamp",
+    for u and for v. anisotropy: samples along the longer side of a pixel's footprint, where levels are blended.
+    """
+
+    def __init__(
+        self, gl: GL, magnify: str, minify: str, levels: str | None, *, wrap: tuple[str, str], anisotropy: int = 1
+    ) -> None:
+        self._gl, self._name = gl, gl.make("GenSamplers")
+        values = {raw.MAG_FILTER: FILTERS[magnify, None], raw.MIN_FILTER: FILTERS[minify, levels]}
+        values |= {parameter: WRAPS[how] for parameter, how in zip(raw.WRAP, wrap, strict=True)}
+        if anisotropy > 1 and minify == levels == "linear":
+            values[raw.MAX_ANISOTROPY] = anisotropy
+        for parameter, value in values.items():
+            gl.SamplerParameteri(self._name, parameter, value)
+
+    def use(self, unit: int) -> None:
+        """Bind it to a texture unit."""
+        self._gl.BindSampler(unit, self._name)
+
+    def release(self) -> None:
+        """Delete it."""
+        self._gl.delete("DeleteSamplers", self._name)

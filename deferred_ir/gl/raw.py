@@ -22,6 +22,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "ActiveTexture": (None, _U),
     "BindFramebuffer": (None, _U, _U),
     "BindImageTexture": (None, _U, _U, _I, ctypes.c_ubyte, _I, _U, _U),
+    "BindSampler": (None, _U, _U),
     "BindTexture": (None, _U, _U),
     "CheckFramebufferStatus": (_U, _U),
     "ClearBufferfv": (None, _U, _I, _P),
@@ -32,14 +33,17 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "DebugMessageCallback": (None, _P, _P),
     "DeleteFramebuffers": (None, _I, _P),
     "DeleteQueries": (None, _I, _P),
+    "DeleteSamplers": (None, _I, _P),
     "DeleteTextures": (None, _I, _P),
     "DepthMask": (None, ctypes.c_ubyte),
     "DrawBuffers": (None, _I, _P),
     "Flush": (None,),
     "FramebufferTexture": (None, _U, _U, _U, _I),
     "FramebufferTextureLayer": (None, _U, _U, _U, _I, _I),
+    "GenerateMipmap": (None, _U),
     "GenFramebuffers": (None, _I, _P),
     "GenQueries": (None, _I, _P),
+    "GenSamplers": (None, _I, _P),
     "GenTextures": (None, _I, _P),
     "GetError": (_U,),
     "GetIntegerv": (None, _U, _P),
@@ -51,6 +55,7 @@ _SIGNATURES: dict[str, tuple[Any, ...]] = {  # result, arguments
     "PixelStorei": (None, _U, _I),
     "QueryCounter": (None, _U, _U),
     "ReadPixels": (None, _I, _I, _I, _I, _U, _U, _P),
+    "SamplerParameteri": (None, _U, _U, _I),
     "Scissor": (None, _I, _I, _I, _I),
     "TexStorage2D": (None, _U, _I, _U, _I, _I),
     "TexStorage3D": (None, _U, _I, _U, _I, _I, _I),
@@ -84,6 +89,12 @@ SAMPLERS = frozenset(
 )
 """Types of sampler uniforms: float, shadow, rectangle, buffer, array, signed, unsigned, cube array, multisampled."""
 READ_WRITE = 0x88BA
+WRAP = 0x2802, 0x2803
+"""Names of the parameters for u and v."""
+MAG_FILTER, MIN_FILTER, MAX_ANISOTROPY = 0x2800, 0x2801, 0x84FE
+NEAREST, LINEAR = 0x2600, 0x2601
+NEAREST_MIPMAP_NEAREST, LINEAR_MIPMAP_NEAREST, NEAREST_MIPMAP_LINEAR, LINEAR_MIPMAP_LINEAR = range(0x2700, 0x2704)
+REPEAT, CLAMP_TO_EDGE, MIRRORED_REPEAT = 0x2901, 0x812F, 0x8370
 TEXTURE_FETCH_BARRIER, IMAGE_ACCESS_BARRIER, TEXTURE_UPDATE_BARRIER, FRAMEBUFFER_BARRIER = 0x8, 0x20, 0x100, 0x400
 OUT_OF_MEMORY, CONTEXT_LOST = 0x0505, 0x0507
 DEBUG_OUTPUT, DEBUG_OUTPUT_SYNCHRONOUS, DEBUG_SOURCE_API = 0x92E0, 0x8242, 0x8246
@@ -116,13 +127,13 @@ class GL:
         return self._type(None, _U, _U, _U, _U, _I, ctypes.c_char_p, _P)(function)
 
     def make(self, function: str) -> int:
-        """Return a new name from GenTextures, GenFramebuffers or GenQueries."""
+        """Return a new name from GenTextures, GenSamplers, GenFramebuffers or GenQueries."""
         name = _U()
         getattr(self, function)(1, ctypes.byref(name))
         return name.value
 
     def delete(self, function: str, name: int) -> None:
-        """Delete a name by DeleteTextures, DeleteFramebuffers or DeleteQueries."""
+        """Delete a name by DeleteTextures, DeleteSamplers, DeleteFramebuffers or DeleteQueries."""
         getattr(self, function)(1, ctypes.byref(_U(name)))
 
     def integers(self, what: int, count: int = 1) -> list[int]:

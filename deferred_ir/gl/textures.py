@@ -21,15 +21,16 @@ SCRATCH_UNIT = 31
 
 
 class GpuTexture:
-    """A 2D texture or array texture of one level. size: (width, height). layers: of an array, at present; else 0.
+    """A 2D texture or array texture. size: (width, height). layers: of an array, at present; else 0.
 
-    nbytes: what the driver has allocated for its texels. version: a process-wide unique number, a new one whenever
-    something was written into it.
+    has_levels: it has mipmaps, which `make_levels` fills; else one level. nbytes: what the driver has allocated for its
+    texels. version: a process-wide unique number, a new one whenever something was written into it.
     """
 
-    def __init__(self, gpu: Gpu, description: Texture, size: tuple[int, int]) -> None:
+    def __init__(self, gpu: Gpu, description: Texture, size: tuple[int, int], *, has_levels: bool = False) -> None:
         self.gpu, self.description, self.size = gpu, description, size
         self.format = FORMATS[description.format]
+        self._levels = max(size).bit_length() if has_levels else 1
         self.target = raw.TEXTURE_2D_ARRAY if description.layers else raw.TEXTURE_2D
         self._allocate(min(description.layers, 1) if description.grows else description.layers)
 
@@ -40,9 +41,9 @@ class GpuTexture:
         self.glo = gl.make("GenTextures")
         self._bind_to_work()
         if layers:
-            gl.TexStorage3D(self.target, 1, self.format.internal, *self.size, layers)
+            gl.TexStorage3D(self.target, self._levels, self.format.internal, *self.size, layers)
         else:
-            gl.TexStorage2D(self.target, 1, self.format.internal, *self.size)
+            gl.TexStorage2D(self.target, self._levels, self.format.internal, *self.size)
         try:
             nominal = self.size[0] * self.size[1] * max(layers, 1) * self.format.bytes
             gl.check(f"texture {self.description} of {nominal / 2**20:.0f} MiB")
@@ -61,7 +62,8 @@ class GpuTexture:
             return value.value
 
         bits = sum(parameter(name) for name in raw.TEXTURE_BITS)
-        return parameter(raw.TEXTURE_WIDTH) * parameter(raw.TEXTURE_HEIGHT) * parameter(raw.TEXTURE_DEPTH) * bits // 8
+        first = parameter(raw.TEXTURE_WIDTH) * parameter(raw.TEXTURE_HEIGHT) * parameter(raw.TEXTURE_DEPTH) * bits // 8
+        return first * 4 // 3 if self._levels > 1 else first
 
     def fit(self, layers: int) -> bool:
         """Make room for `layers` layers; up to twice as many are fine. Returns whether it was allocated anew for that.
@@ -93,6 +95,20 @@ class GpuTexture:
             gl.TexSubImage3D(self.target, 0, 0, 0, 0, *self.size, self.layers, *source)
         else:
             gl.TexSubImage2D(self.target, 0, 0, 0, *self.size, *source)
+
+    def upload_layer(self, layer: int, pixels: Any) -> None:
+        """Fill level 0 of one layer from (H, W, channels), as `upload` does."""
+        self.touch()
+        gl, data = self.gpu.gl, np.ascontiguousarray(pixels, self.format.dtype)
+        self._bind_to_work()
+        gl.PixelStorei(raw.UNPACK_ALIGNMENT, 1)
+        source = self.format.layout, self.format.type, data.ctypes.data_as(ctypes.c_void_p)
+        gl.TexSubImage3D(self.target, 0, 0, 0, layer, *self.size, 1, *source)
+
+    def make_levels(self) -> None:
+        """Compute all mipmaps from level 0."""
+        self._bind_to_work()
+        self.gpu.gl.GenerateMipmap(self.target)
 
     def _bind_to_work(self) -> None:
         """Bind it in the scratch unit, where OpenGL's texture functions act on it."""

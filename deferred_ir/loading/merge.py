@@ -48,7 +48,7 @@ def merge(
         own = {slot: renumber(texture, owner) for slot, texture in part.material.textures.items()}
         material = part.material.with_textures(own)
         face_materials.append(np.full(len(part.faces), materials.setdefault(material, len(materials))))
-    ranks = np.array([_rank(material) for material in materials])[np.concatenate(face_materials)]
+    ranks = _rank(list(materials), [texture for _, texture in textures.values()])[np.concatenate(face_materials)]
     order = np.lexsort(ranks.T[::-1])
     faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=False)])
     ranges, first = [], 0
@@ -73,9 +73,25 @@ def merge(
     return geometry, tuple(materials), tuple(texture for _, texture in textures.values()), tuple(ranges)
 
 
-def _rank(material: Material) -> list[int]:
-    """Return the numbers that faces are sorted by: of the material's textures, none first."""
-    return [-1 if texture is None else texture.number for texture in material.textures.values()]
+def _rank(materials: Sequence[Material], textures: Sequence[Texture]) -> Array:
+    """Return the numbers that faces are sorted by, (materials, n): kinds of textures, then textures, none first.
+
+    Of one kind are those that a draw call can read together (frame/uploads/scene_textures.py).
+    """
+    kinds: dict[Any, int] = {}
+    ranks = []
+    for material in materials:
+        used = list(material.textures.values())
+        kind = [
+            -1
+            if ref is None
+            else kinds.setdefault(
+                (textures[ref.number].pixels.shape[:2], textures[ref.number].pixels.dtype.str, ref.sampler), len(kinds)
+            )
+            for ref in used
+        ]
+        ranks.append([*kind, *(-1 if ref is None else ref.number for ref in used)])
+    return np.array(ranks)
 
 
 def _join(parts: list[Part], pick: Callable[[Part], Array | None], filler: Array) -> Array | None:

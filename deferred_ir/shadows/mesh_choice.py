@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from deferred_ir.frame.cluster_buffers import ClusterBuffers
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.uploads.cluster_buffers import ClusterBuffers
 from deferred_ir.meshes import levels
 from deferred_ir.meshes.clusters import Clusters
 from deferred_ir.meshes.posed import MapMesh

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from deferred_ir.frame.cluster_buffers import ClusterBuffers
 from deferred_ir.frame.pass_io import Io
+from deferred_ir.frame.uploads.cluster_buffers import ClusterBuffers
 from deferred_ir.shadows.batches import MapBatch
 from deferred_ir.shadows.settings import LEAST_REACH, MapParams
 

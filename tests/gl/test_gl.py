@@ -89,7 +89,9 @@ def test_samplers_are_shared_and_differ_where_their_use_does(gpu):
     assert gpu.sampler(linear=True) is gpu.sampler(linear=True)
     assert gpu.sampler(linear=True) is not gpu.sampler(linear=False)
     assert gpu.sampler(linear=True, compare=">=") is not gpu.sampler(linear=True)
-    assert gpu.sampler(linear=True, repeat=True) is not gpu.sampler(linear=True)
+    plain = gpu.image_sampler("linear", "linear", None, ("repeat", "repeat"))
+    assert plain is gpu.image_sampler("linear", "linear", None, ("repeat", "repeat"))
+    assert plain is not gpu.image_sampler("linear", "linear", None, ("repeat", "mirror"))
 
 
 def test_a_function_that_the_driver_lacks_is_one_line():

@@ -47,6 +47,16 @@ float light_strength(DirectLight light, vec3 position, vec3 normal, vec3 shading
     return STRENGTH_0(light, position, normal, shading_normal);
 }
 
+// The way to a light, or against its light if it lies at infinity: without a cone, but with an axis.
+vec3 way_to(DirectLight light, vec3 position) {
+    return light.one_minus_cos == 0.0 && light.axis != vec3(0.0) ? -light.axis : light.position - position;
+}
+
+// Of a light with an area: the square of half the angle of its radius.
+float light_spread(DirectLight light, vec3 to) {
+    return 0.25 * light.radius * light.radius / max(dot(to, to), TINY);
+}
+
 vec3 light_irradiance(DirectLight light, vec3 position, vec3 normal, vec3 shading_normal) {
     return light.emission * light_strength(light, position, normal, shading_normal);
 }

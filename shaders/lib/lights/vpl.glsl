@@ -23,11 +23,16 @@ layout(std140, binding = VPLS_BINDING) uniform Vpls { Vpl vpls[VPLS_PER_BLOCK]; 
 #define PARALLEL 1
 #endif
 
+// The way from a VPL to a surface.
+vec3 way_from(Vpl vpl, vec3 position) {
+#if PARALLEL
+    if (vpl.tan_half == 0.0) return vpl.z_axis;
+#endif
+    return position - vpl.position;
+}
+
 // I(w) = E_i cos(theta_y) inside a round cone, dark outside. From infinity E_i is the irradiance on a plane that faces it.
 vec3 vpl_irradiance(Vpl vpl, vec3 position, vec3 normal, vec3 shading_normal) {
-    vec3 from = position - vpl.position;
-#if PARALLEL
-    if (vpl.tan_half == 0.0) from = vpl.z_axis;
-#endif
+    vec3 from = way_from(vpl, position);
     return vpl.emission * vpl_kernel(from, vpl.z_axis, normal, shading_normal, 1.0 - vpl.one_minus_cos, vpl.clamp_squared);
 }

@@ -1,5 +1,16 @@
-// Encoding of the G-buffer's normals: two unit vectors as octahedral maps, in the four 16-bit channels of one texel
+// Encoding of the G-buffer's material, in four 16-bit channels, and of its normals: two unit vectors as octahedral maps, in the four 16-bit channels of one texel
 // (Cigolle et al. 2014).
+
+const float MOST = 65535.0;  // of 16 bits
+
+vec4 encode_material(float roughness, float metallic, int number) {
+    return vec4(roughness, metallic, vec2(number & 65535, number >> 16) / MOST);
+}
+
+int material_number(vec4 code) {
+    ivec2 parts = ivec2(code.zw * MOST + 0.5);
+    return parts.x + (parts.y << 16);
+}
 
 vec2 octahedral(vec3 n) {
     n /= abs(n.x) + abs(n.y) + abs(n.z);  // a unit vector: the sum is at least 1

@@ -1,4 +1,4 @@
-"""A scene on the GPU: vertices, faces, materials and textures, uploaded once; moving models are updated."""
+"""A scene on the GPU: vertices, faces and materials, uploaded once; moving models are updated."""
 
 from __future__ import annotations
 
@@ -10,22 +10,21 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints
-from deferred_ir.base.colour import srgb_table
-from deferred_ir.base.errors import DeviceError
-from deferred_ir.frame.cluster_buffers import ClusterBuffers
+from deferred_ir.frame.uploads.cluster_buffers import ClusterBuffers
+from deferred_ir.frame.uploads.material_tables import describe_materials, pack_materials
+from deferred_ir.frame.uploads.scene_textures import SceneTextures
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.shaders import Program
-from deferred_ir.gl.textures import GpuTexture
-from deferred_ir.graph.ports import Texture
 from deferred_ir.meshes.clusters import Clusters
 from deferred_ir.meshes.posed import MapMesh, PosedMesh
 from deferred_ir.scene.geometry import Geometry
 from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.surfaces.materials import SLOTS
 
-FACES, MATERIALS, EMISSIONS = 0, 1, 2
-"""Bindings of the storage buffers that lib/surface/surface.glsl declares."""
-ALBEDO_TEXTURE, EMISSION_TEXTURE = 15, 14
-"""Texture units of `albedo_texture` and `emission_texture`; inputs of passes count up from 0, and GL promises 16."""
+FACES = 0
+"""Binding of the storage buffer of faces; lib/surface/surface.glsl declares it, and those of materials."""
+FIRST_UNIT = 15
+"""Texture unit of the first slot of materials, further ones below; inputs of passes count up from 0."""
 OWN = "own"
 """Key of the scene's own clusters, among those of stand-in meshes."""
 
@@ -41,23 +40,27 @@ class SceneBuffers:
     def __init__(self, gpu: Gpu, scene: Scene, *, general: bool = False) -> None:
         self.gpu, g = gpu, scene.geometry
         self._geometry, self._poses = g, g.poses.copy()
+        self._textures = SceneTextures(gpu, scene.materials, scene.textures)
         uvs = g.uvs if scene.textures else None
         arrays = {"position": g.positions, "normal": g.normals, "color": g.colors, "uv": uvs}
+        arrays |= {"second_uv": g.second_uvs, "tangent": g.tangents}
         if general:
             count = len(g.positions)
             # No normal: the face's counts. Without a texture nothing is looked up at `uv`. There is no such colour: an
             # interpolated 1 is not quite 1.
             neutral = {"normal": np.zeros((count, 3)), "uv": np.zeros((count, 2))}
             arrays |= {name: array for name, array in neutral.items() if arrays[name] is None}
-        self._runs = _find_runs(scene)
+        self._runs = _find_runs(scene, self._textures.arrays)
         self.is_smooth = g.is_smooth or general
         self.defines = {
             "HAS_NORMALS": int(arrays["normal"] is not None),
             "HAS_UVS": int(arrays["uv"] is not None),
             "HAS_COLORS": int(arrays["color"] is not None),
+            "HAS_TANGENTS": int(g.tangents is not None),
+            "HAS_SECOND_UVS": int(g.second_uvs is not None),
             "ONE_MATERIAL": int(len(scene.materials) == 1 and not general),
-            "ALL_TEXTURED": int(all(run.texture is not None for run in self._runs) and not general),
-            "EMITS": int(scene.shows_emission),
+            "ALL_TEXTURED": int(bool((self._textures.arrays[0] >= 0).all()) and not general),
+            **describe_materials(scene),
         }
         ctx = gpu.ctx
         self._attributes = {
@@ -67,20 +70,21 @@ class SceneBuffers:
         }
         self._indices = ctx.buffer(np.ascontiguousarray(g.faces, "u4").tobytes())
         faces = _pack_faces(g, slice(None))
-        materials = np.array([(*material.base_color, 0) for material in scene.materials], "f4")
-        self._faces, self._materials = ctx.buffer(faces.tobytes()), ctx.buffer(materials.tobytes())
+        self._faces = ctx.buffer(faces.tobytes())
+        self._materials = {
+            binding: ctx.buffer(table.tobytes())
+            for binding, table in pack_materials(scene, self._textures.layers, self._textures.arrays).items()
+        }
         gpu.gl.check(f"scene '{scene.name}' with {len(g.faces)} triangles")
-        self._textures = [self._upload(texture) for texture in scene.textures]
         self.face_count = len(g.faces)
-        buffers = [*(buffer for buffer, _ in self._attributes.values()), self._indices, self._faces, self._materials]
-        self._emissions = None
-        if scene.shows_emission:
-            emissions = [(*material.emission, material.emits_both_sides) for material in scene.materials]
-            self._emissions = ctx.buffer(np.array(emissions, "f4").tobytes())
-            buffers.append(self._emissions)
-        self._buffers = buffers
+        buffers = [buffer for buffer, _ in self._attributes.values()]
+        self._buffers = [*buffers, self._indices, self._faces, *self._materials.values()]
         self._clustered: dict[Hashable, ClusterBuffers] = {}
-        self.texture_bytes = sum(texture.nbytes for texture in self._textures)
+
+    @property
+    def texture_bytes(self) -> int:
+        """Bytes of all textures."""
+        return self._textures.nbytes
 
     @property
     def buffer_bytes(self) -> int:
@@ -131,10 +135,13 @@ class SceneBuffers:
         for number in np.flatnonzero((geometry.poses != self._poses).any(axis=(1, 2))).tolist():
             self._poses[number] = np.nan  # until all is uploaded: a move that fails midway is repeated
             vertices = geometry.moving[number].vertices
-            for name, array in (("position", geometry.positions), ("normal", geometry.normals)):
+            moved = {"position": geometry.positions, "normal": geometry.normals, "tangent": geometry.tangents}
+            for name, array in moved.items():
                 if array is not None:
                     part = np.ascontiguousarray(array[vertices], "f4")
-                    self._attributes[name][0].write(part.tobytes(), offset=12 * vertices.start)
+                    self._attributes[name][0].write(
+                        part.tobytes(), offset=part.itemsize * part.shape[1] * vertices.start
+                    )
             for faces in _group_runs(geometry.faces_of_models[number]):
                 self._faces.write(_pack_faces(geometry, faces).tobytes(), offset=16 * faces.start)
             if "_own" in self.__dict__:
@@ -143,48 +150,33 @@ class SceneBuffers:
                 mesh.move(number, geometry.poses[number])
             self._poses[number] = geometry.poses[number]
 
-    def _upload(self, texture: Any) -> GpuTexture:
-        height, width = texture.pixels.shape[:2]
-        if max(width, height) > self.gpu.max_size:
-            raise DeviceError(
-                f"{texture.name}: {width}x{height} pixels, and this driver takes at most {self.gpu.max_size}; "
-                "scale the image down"
-            )
-        # Decoded here, into half floats: drivers may approximate sRGB (llvmpipe is 2 % off in dark texels), and rays
-        # must fetch what the rasteriser shows.
-        linear = np.ones((height, width, 4), np.float32)
-        linear[..., :3] = srgb_table().astype(np.float16)[texture.pixels[..., :3]]
-        result = GpuTexture(self.gpu, Texture("rgba16f", (width, height)), (width, height))
-        result.upload(linear[::-1])
-        return result
-
     def bind(self) -> None:
         """Bind faces and materials for shaders."""
         self._faces.bind_to_storage_buffer(FACES)
-        self._materials.bind_to_storage_buffer(MATERIALS)
-        if self._emissions:
-            self._emissions.bind_to_storage_buffer(EMISSIONS)
+        for binding, table in self._materials.items():
+            table.bind_to_storage_buffer(binding)
 
-    def draw(self, program: Program, instances: int = 1) -> None:
-        """Draw all triangles in one call, or in one for each texture if the program samples textures."""
+    def draw(self, program: Program, instances: int = 1, mipmaps: str = "auto") -> None:
+        """Draw all triangles in one call, or in one for each set of texture arrays if the program samples textures.
+
+        mipmaps: see SceneTextures.bind.
+        """
         array = program.arrays.get(self)
         if array is None:
             attributes = [(*self._attributes[name], name) for name in program.attributes]
             array = self.gpu.ctx.vertex_array(program.glsl, attributes, self._indices, index_element_size=4)
             program.arrays[self] = array
-        if not program.samplers & {"albedo_texture", "emission_texture"}:
+        read = [slot for slot, name in enumerate(SLOTS) if f"{name}_texture" in program.samplers]
+        if not read:
             if program.has("first_face"):
                 program.set(first_face=0)
             array.render(self.gpu.ctx.TRIANGLES, instances=instances)
             return
         for run in self._runs:
-            if run.texture is not None:
-                self._textures[run.texture].bind(ALBEDO_TEXTURE, self.gpu.sampler(linear=True, repeat=True))
-            if "emission_texture" in program.samplers:
-                if run.emission is not None:
-                    self._textures[run.emission].bind(EMISSION_TEXTURE, self.gpu.sampler(linear=True, repeat=True))
-                program.set(emission_textured=run.emission is not None)
-            program.set(textured=run.texture is not None, first_face=run.first)
+            for slot in read:
+                if run.arrays[slot] >= 0:
+                    self._textures.bind(FIRST_UNIT - slot, run.arrays[slot], mipmaps)
+            program.set(first_face=run.first)
             vertices, first = 3 * run.count, 3 * run.first
             array.render(self.gpu.ctx.TRIANGLES, vertices=vertices, first=first, instances=instances)
 
@@ -194,8 +186,7 @@ class SceneBuffers:
             mesh.release()
         for buffer in self._buffers:
             buffer.release()
-        for texture in self._textures:
-            texture.release()
+        self._textures.release()
 
 
 def _pack_faces(geometry: Geometry, faces: slice) -> Array:
@@ -211,24 +202,21 @@ def _group_runs(numbers: Ints) -> list[slice]:
 
 @dataclass(frozen=True)
 class _Run:
-    """Faces first, first + 1, ... with one texture of reflectance and one of emission, if any."""
+    """Faces first, first + 1, ... whose materials' textures are in the same arrays, one for each slot, -1 for none."""
 
-    texture: int | None
-    emission: int | None
+    arrays: tuple[int, ...]
     first: int
     count: int
 
 
-def _find_runs(scene: Scene) -> list[_Run]:
-    """Return the runs of faces with the same textures; loading sorts faces by these."""
-    textures = [
-        tuple(None if texture is None else texture.number for texture in (m.base_color_texture, m.emission_texture))
-        for m in scene.materials
-    ]
-    kinds = {pair: number for number, pair in enumerate(dict.fromkeys(textures))}
-    of_face = np.array([kinds[pair] for pair in textures])[scene.geometry.face_materials]
+def _find_runs(scene: Scene, arrays: Ints) -> list[_Run]:
+    """Return the runs of faces with the same `arrays` (slots, materials); loading sorts faces by these."""
+    of_material = np.unique(arrays.T, axis=0, return_inverse=True)[1].reshape(-1)
+    of_face = of_material[scene.geometry.face_materials]
     starts = np.flatnonzero(np.diff(of_face, prepend=of_face[0] - 1))
     ends = np.append(starts[1:], len(of_face))
-    pairs = list(kinds)
-    found = [(*pairs[of_face[start]], int(start), int(end - start)) for start, end in zip(starts, ends, strict=True)]
-    return [_Run(texture, emission, first, count) for texture, emission, first, count in found]
+    first = scene.geometry.face_materials[starts]
+    return [
+        _Run(tuple(arrays[:, material].tolist()), int(start), int(end - start))
+        for material, start, end in zip(first, starts, ends, strict=True)
+    ]

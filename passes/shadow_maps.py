@@ -9,6 +9,7 @@ four clip distances clip to the tile.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any, ClassVar
 
 import numpy as np
@@ -129,25 +130,26 @@ class ShadowMaps(Pass):
         for start in range(0, len(placed) if used else 0, block):
             io["views"].bind(start // block)
             here = np.flatnonzero(maps.dirty[:used] & (described.rows[:used] // block == start // block))
-            self._draw(frame.buffers.cluster_buffers, io, placed[start : start + block], described.rows[here] - start)
+            self._draw(frame.buffers.map_meshes, io, placed[start : start + block], described.rows[here] - start)
         if len(vpls):
-            mesh = mesh_choice.choose_mesh(frame, self.params)
+            meshes = mesh_choice.choose_meshes(frame, self.params)
             block, dirty = io["vpls"].description.block, maps.dirty[used:]
             for start in range(0, len(vpls), block):
                 io["vpls"].bind(start // block)
-                self._draw(mesh, io, vpls[start : start + block], np.flatnonzero(dirty[start : start + block]))
+                self._draw(meshes, io, vpls[start : start + block], np.flatnonzero(dirty[start : start + block]))
             mesh_choice.report_size(frame, io, self.params)
         io.state.remember()
         io.count(figures.MAPS_DRAWN.name, int(maps.dirty.sum()))
 
-    def _draw(self, mesh: ClusterBuffers, io: Io, records: np.ndarray, chosen: Ints) -> None:
-        """Draw `mesh` into the maps of the rows `chosen` of the bound block of views or VPLs, `records`."""
-        for batch in make_batches(records, chosen, self.params):
+    def _draw(self, meshes: Sequence[ClusterBuffers], io: Io, records: np.ndarray, chosen: Ints) -> None:
+        """Draw `meshes` into the maps of the rows `chosen` of the bound block of views or VPLs, `records`."""
+        for mesh, batch in product(meshes, make_batches(records, chosen, self.params)):
             if batch.projection == PARABOLOID:
                 draw_curved(mesh, io, self.params, batch, layered=True)
                 continue
             geometry = [] if io.gpu.layer_from_vertex else ["shadow_maps/layer.geom"]
-            program = io.program("shadow_maps/depth.frag", "shadow_maps/planar.vert", *geometry, defines=batch.defines)
+            files = "shadow_maps/depth.frag", "shadow_maps/planar.vert", *geometry
+            program = io.program(*files, defines={**batch.defines, **mesh.defines})
             io.gpu.clip(4)
             mesh.draw(program, batch.find_visible(mesh.clusters), batch.chosen)
 

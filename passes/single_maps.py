@@ -5,7 +5,7 @@ They are drawn one by one and share nothing with the atlas, so that the equivale
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -81,7 +81,7 @@ class SingleMaps(Pass):
         views, block = pack_views(frame, described, layout, edge), io["views"].description.block
         placed = place_views(views, described.rows, block)
         io["views"].write(placed)
-        shining, scene = find_shining(io["lights"].records)[described.owners], frame.buffers.cluster_buffers
+        shining, scene = find_shining(io["lights"].records)[described.owners], frame.buffers.map_meshes
         for view in np.flatnonzero(shining).tolist():
             row = int(described.rows[view])
             start = row // block * block
@@ -90,29 +90,33 @@ class SingleMaps(Pass):
             self._draw(frame, io, io["light_maps"][view], scene, *batch)
         vpls, block = io["vpls"].records, io["vpls"].description.block
         drawn = np.flatnonzero(find_shining(vpls)).tolist()
-        mesh = mesh_choice.choose_mesh(frame, p) if drawn else scene
+        meshes = mesh_choice.choose_meshes(frame, p) if drawn else scene
         for i in drawn:
             start = i // block * block
             io["vpls"].bind(i // block)
             batch = make_batches(vpls[start : start + block], np.array([i - start]), p)
-            self._draw(frame, io, io["vpl_maps"][int(vpls["tile"][i])], mesh, *batch)
+            self._draw(frame, io, io["vpl_maps"][int(vpls["tile"][i])], meshes, *batch)
         io.count(figures.MAPS_DRAWN.name, int(shining.sum()) + len(drawn))
         if drawn:
             mesh_choice.report_size(frame, io, p)
 
-    def _draw(self, frame: Frame, io: Io, target: GpuTexture, mesh: ClusterBuffers, batch: MapBatch) -> None:
-        """Draw `mesh` into the texture `target`, the only map of `batch`."""
+    def _draw(
+        self, frame: Frame, io: Io, target: GpuTexture, meshes: Sequence[ClusterBuffers], batch: MapBatch
+    ) -> None:
+        """Draw `meshes` into the texture `target`, the only map of `batch`."""
         target.framebuffer.bind()
         target.framebuffer.clear_depth()
-        if batch.projection == PARABOLOID:
-            draw_curved(mesh, io, self.params, batch, layered=False)
-            return
-        program = io.program("shadow_maps/depth.frag", "shadow_maps/single.vert", defines=batch.defines)
-        program.set(view_number=int(batch.chosen[0]))
-        if mesh is frame.buffers.cluster_buffers:
-            frame.buffers.draw(program)
-        else:
-            mesh.draw_all(program, batch.records[batch.chosen])
+        for mesh in meshes:
+            if batch.projection == PARABOLOID:
+                draw_curved(mesh, io, self.params, batch, layered=False)
+                continue
+            defines = {**batch.defines, **mesh.defines}
+            program = io.program("shadow_maps/depth.frag", "shadow_maps/single.vert", defines=defines)
+            program.set(view_number=int(batch.chosen[0]))
+            if mesh is frame.buffers.cluster_buffers:
+                frame.buffers.draw(program)
+            else:
+                mesh.draw_all(program, batch.records[batch.chosen])
 
 
 PASS = SingleMaps

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
+from deferred_ir.rays.cutouts import CutOutRays
 from deferred_ir.rays.embree import INFINITE, EmbreeScenes
 from deferred_ir.scene.scene import Scene
 from deferred_ir.scene.surfaces.brdf import Gloss
@@ -72,7 +73,9 @@ class Tracer:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.seconds = 0.0
-        self._rays = EmbreeScenes(scene.geometry)
+        self._rays: EmbreeScenes | CutOutRays = EmbreeScenes(scene.geometry)
+        if scene.has_cutouts:
+            self._rays = CutOutRays(self._rays, lambda: self.scene)
         self.offset = OFFSET * scene.geometry.scale
 
     def follow(self, scene: Scene) -> None:

@@ -21,15 +21,17 @@ SPLIT = ("shadow_maps/paraboloid.tesc", "shadow_maps/paraboloid.tese")
 def draw_curved(mesh: ClusterBuffers, io: Io, params: MapParams, batch: MapBatch, *, layered: bool) -> None:
     """Draw `mesh` into paraboloid maps; layered: into an atlas."""
     gpu, clusters, views = io.gpu, mesh.clusters, batch.records[batch.chosen]
-    straight = batch.vpls and params.tessellation == "pre"
+    # Where in an image a fragment lies is known of split triangles alone.
+    cut = bool(mesh.defines["CUT"])
+    straight = batch.vpls and params.tessellation == "pre" and not cut
     visible = batch.find_visible(clusters)
-    bent = np.False_ if straight else clusters.find_bent(views, params.reach(views, batch.size))
+    bent = np.False_ if straight else np.True_ if cut else clusters.find_bent(views, params.reach(views, batch.size))
     gpu.clip(5)  # behind the view, and the map's four sides
     geometry = ["shadow_maps/paraboloid.geom"] if layered and not gpu.layer_from_vertex else []
     for split, drawn in ((False, visible & ~bent), (True, visible & bent)):
         if drawn.any():
             files = [*FILES, *(SPLIT if split else ()), *geometry]
             shape = {"SPLIT": int(split), "STRAIGHT": int(straight), "BEND": float(params.bend)}
-            program = io.program(*files, defines={**batch.defines, **shape, "LEAST_REACH": LEAST_REACH})
+            program = io.program(*files, defines={**batch.defines, **shape, **mesh.defines, "LEAST_REACH": LEAST_REACH})
             mesh.draw(program, drawn, batch.chosen, patches=split)
     gpu.clip(0)

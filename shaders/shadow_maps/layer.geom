@@ -11,6 +11,10 @@ out gl_PerVertex {
     float gl_ClipDistance[4];
 };
 flat in int layer[];
+#if CUT
+in vec3 corner_of_vertex[];
+out vec3 corner;
+#endif
 
 void main() {
     for (int i = 0; i < 3; ++i) {
@@ -18,6 +22,9 @@ void main() {
         gl_Position = gl_in[i].gl_Position;
         for (int side = 0; side < 4; ++side)
             gl_ClipDistance[side] = gl_in[i].gl_ClipDistance[side];
+#if CUT
+        corner = corner_of_vertex[i];
+#endif
         EmitVertex();
     }
     EndPrimitive();

@@ -4,6 +4,9 @@
 #include "lib/shadows/drawn_view.glsl"
 #include "lib/shadows/projection.glsl"
 #include "lib/shadows/paraboloid_varyings.glsl"
+#if CUT
+#include "lib/surface/coverage.glsl"
+#endif
 
 in Part PART part;
 
@@ -26,6 +29,10 @@ void main() {
     bool outside = any(lessThan(inside, vec3(-part.gap)));
     // No near plane: where a wall beside the light stands on the light's own, that would cut off its foot.
     if (outside || direction.z <= 0.0) discard;
+#if CUT
+    vec3 place = part.cut_places * direction;
+    if (is_cut(part.cut_material, place.xy / place.z)) discard;
+#endif
     gl_FragDepth = min(depth, 1.0);
 }
 #elif STRAIGHT

@@ -29,6 +29,10 @@ void main() {
         part.chords = corner[i].chords;
         part.plane = corner[i].plane;
         part.gap = corner[i].gap;
+#if CUT
+        part.cut_places = corner[i].cut_places;
+        part.cut_material = corner[i].cut_material;
+#endif
 #elif STRAIGHT
         part.ndc = corner[i].ndc;
         part.view = corner[i].view;

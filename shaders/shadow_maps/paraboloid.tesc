@@ -9,6 +9,11 @@ layout(vertices = 1) out;
 
 flat in int view_of_corner[];
 in vec3 corner[];
+#if CUT
+in vec3 cut_of_corner[];
+patch out mat3 cut_places;  // as in lib/shadows/paraboloid_varyings.glsl
+patch out int cut_material;
+#endif
 patch out int view_of_patch;
 patch out vec3 corners[4];  // unit, from the light to what is left of the triangle; the last two may be one
 patch out vec4 inwards[4];  // normals of the planes through the light and the edge to the next corner; angles of the edges
@@ -97,6 +102,15 @@ void main() {
     }
     mat3 to_frame = transpose(mat3(view.x_axis * view.tan_half, view.y_axis * view.tan_half, view.z_axis));
     turn = h < 0.0 ? -1.0 : 1.0;
+#if CUT
+    // Weights of the corners in a direction, over a common factor, are its products with these.
+    float unit_size = 1.0 / max(sizes.x, max(sizes.y, sizes.z));  // not 0: the triangle is not seen edge-on
+    vec3 p = a * unit_size, q = b * unit_size, r = c * unit_size;
+    mat3 across_corners = mat3(cross(q, r), cross(r, p), cross(p, q));
+    mat3 values = mat3(vec3(cut_of_corner[0].xy, 1.0), vec3(cut_of_corner[1].xy, 1.0), vec3(cut_of_corner[2].xy, 1.0));
+    cut_places = values * transpose(to_frame * across_corners);
+    cut_material = int(cut_of_corner[0].z + 0.5);
+#endif
     float texel = texel_angle(view), longest = 0.0;
     vec3 depths = normal / h, triangle[3] = vec3[3](a, b, c), units[3] = vec3[3](unit(a), unit(b), unit(c));
     float longest_straight = straight_side(texel);

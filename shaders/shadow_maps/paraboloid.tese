@@ -15,6 +15,10 @@ patch in mat3 edges;
 patch in mat3 chords;
 patch in vec4 plane;
 patch in float gap;
+#if CUT
+patch in mat3 cut_places;
+patch in int cut_material;
+#endif
 
 // The direction that divides the edge from corner i to the next by angle, moved out.
 vec3 on_edge(int i, float t) {
@@ -42,5 +46,9 @@ void main() {
     part.chords = chords;
     part.plane = plane;
     part.gap = gap;
+#if CUT
+    part.cut_places = cut_places;
+    part.cut_material = cut_material;
+#endif
     part.ndc = place(drawn_view(view_of_patch), direction);
 }

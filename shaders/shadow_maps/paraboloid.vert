@@ -6,6 +6,10 @@
 #if SPLIT
 flat out int view_of_corner;
 out vec3 corner;  // from the view
+#if CUT
+in vec3 cut_corner;
+out vec3 cut_of_corner;
+#endif
 #else
 #include "lib/shadows/paraboloid.glsl"
 #endif
@@ -19,6 +23,9 @@ void main() {
 #if SPLIT
     view_of_corner = view_index;
     corner = d;
+#if CUT
+    cut_of_corner = cut_corner;
+#endif
 #else
     part.seen = d;
     vec2 map_ndc = place(view, d);

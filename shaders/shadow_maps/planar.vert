@@ -7,6 +7,14 @@
 
 in int view_index;  // in its block; one an instance
 in vec3 position;
+#if CUT
+in vec3 cut_corner;
+#if LAYER_FROM_VERTEX
+out vec3 corner;
+#else
+out vec3 corner_of_vertex;
+#endif
+#endif
 #if LAYER_FROM_VERTEX
 out float gl_ClipDistance[4];
 #else
@@ -26,6 +34,11 @@ void main() {
     gl_ClipDistance[2] = clip.w + clip.y;
     gl_ClipDistance[3] = clip.w - clip.y;
     gl_Position = in_rectangle(clip, view.rectangle);
+#if CUT && LAYER_FROM_VERTEX
+    corner = cut_corner;
+#elif CUT
+    corner_of_vertex = cut_corner;
+#endif
 #if LAYER_FROM_VERTEX
     gl_Layer = int(view.rectangle.w);
 #else

@@ -4,7 +4,14 @@
 
 uniform int view_number;  // in this block
 in vec3 position;
+#if CUT
+in vec3 cut_corner;
+out vec3 corner;
+#endif
 
 void main() {
+#if CUT
+    corner = cut_corner;
+#endif
     gl_Position = flat_clip(drawn_view(view_number), position);
 }

@@ -62,7 +62,7 @@ def test_run_json_holds_what_the_contract_promises(tmp_path):
     what = [entry["what"] for entry in run["left_out"]]
     assert what[:4] == absent
     assert what[4].endswith(" pairs of tile and light")
-    assert what[5:] == ["light_points", "environment", "gbuffer.emission"]
+    assert what[5:] == ["light_points", "environment", "gbuffer.emission", "gbuffer.material"]
     assert run["memory_bytes"]["textures"] > 2 * 4 * 1024**2  # two layers of the atlas
     names = [entry["name"] for entry in run["passes"]]
     assert sorted(names) == ["cull_lights", "gbuffer", "lighting", "lights", "shadow_maps", "tonemap", "vpl"]

@@ -104,6 +104,7 @@ def test_without_vpls_nothing_is_cast_shared_or_filtered(renderer, graph):
     assert set(kept.left_out) <= {"shadow_rays", "light_lonely_pixels", "shadow_maps", "interleave", "light_points"} | {
         "environment",
         "gbuffer.emission",
+        "gbuffer.material",
     }
 
 

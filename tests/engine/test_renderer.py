@@ -37,7 +37,7 @@ def test_odd_sizes(renderer, size):
 def test_only_what_is_asked_for_is_made(renderer):
     one = renderer(SIZE)
     plan = one.plan(room(), 4, ["radiance"])
-    assert plan.left_out.keys() == {"tonemap", "light_points", "environment", "gbuffer.emission"}
+    assert plan.left_out.keys() == {"tonemap", "light_points", "environment", "gbuffer.emission", "gbuffer.material"}
     assert plan.left_out["tonemap"] == "no requested output needs it"
     one.draw(room(), plan)
     image = one.read(plan)

@@ -231,12 +231,12 @@ def test_maps_of_vpls_alone_draw_a_stand_in(renderer, monkeypatch, graph, projec
             makes.append(params)
             return halved(scene)
 
-        return frame.buffers.stand_in("halved", make)
+        return [frame.buffers.stand_in("halved", make)]
 
     one = renderer((48, 48), graph, set={"shadow_maps.projection": projection})
     whole, direct = (one.render(scene, vpls=vpls).radiance for vpls in (16, 0))
     before = one._buffers.buffer_bytes
-    monkeypatch.setattr(mesh_choice, "choose_mesh", other)
+    monkeypatch.setattr(mesh_choice, "choose_meshes", other)
     half = [one.render(scene, vpls=16).radiance for _ in range(2)]
     assert half[0].mean() > 1.002 * whole.mean()
     np.testing.assert_array_equal(*half)

@@ -18,11 +18,12 @@ COMMAND = np.dtype([(name, "u4") for name in ("count", "instances", "first_index
 class ClusterBuffers:
     """Indices of a mesh's faces in the order of its clusters, and the commands of the draw calls.
 
-    positions: the buffer of vertices, three floats each; the caller owns it.
+    positions: the buffer of vertices, three floats each; corners: that of what programs read as `cut_corner`, three
+    floats, if the mesh has holes. The caller owns both.
     """
 
-    def __init__(self, gpu: Gpu, posed: PosedMesh, positions: Any) -> None:
-        self.gpu, self.posed, self._positions = gpu, posed, positions
+    def __init__(self, gpu: Gpu, posed: PosedMesh, positions: Any, corners: Any = None) -> None:
+        self.gpu, self.posed, self._positions, self._corners = gpu, posed, positions, corners
         self.clusters = clusters = posed.clusters
         faces = posed.mesh.faces
         self._indices = gpu.ctx.buffer(np.ascontiguousarray(faces[clusters.order], "u4").tobytes())
@@ -31,6 +32,11 @@ class ClusterBuffers:
         self._each = np.zeros(len(clusters), COMMAND)
         self._each["count"], self._each["first_index"] = 3 * clusters.sizes, 3 * clusters.starts[:-1]
         gpu.gl.check(f"clusters of {len(faces)} triangles")
+
+    @property
+    def defines(self) -> dict[str, int]:
+        """Defines of programs that draw it: CUT, whether it has holes."""
+        return {"CUT": int(self._corners is not None)}
 
     @property
     def nbytes(self) -> int:
@@ -83,6 +89,7 @@ class ClusterBuffers:
         if self not in program.arrays:
             # An instanced attribute counts from base_instance; gl_InstanceID does not.
             known = [(self._positions, "3f", "position"), (self._lights, "1i/i", "view_index")]
+            known += [(self._corners, "3f", "cut_corner")] if self._corners else []
             attributes = [attribute for attribute in known if attribute[2] in program.attributes]
             program.arrays[self] = self.gpu.ctx.vertex_array(
                 program.glsl, attributes, self._indices, index_element_size=4

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints
@@ -24,7 +22,7 @@ def describe_materials(scene: Scene) -> dict[str, int]:
     return {name: int(value) for name, value in (found | slots).items()}
 
 
-def pack_materials(scene: Scene, layers: Ints, arrays: Ints) -> Mapping[int, Array]:
+def pack_materials(scene: Scene, layers: Ints, arrays: Ints) -> dict[int, Array]:
     """Return the tables that the scene needs by their bindings, float32.
 
     layers, arrays: of each slot's texture, (slots, materials), see SceneTextures; an array -1 is none.
@@ -33,7 +31,7 @@ def pack_materials(scene: Scene, layers: Ints, arrays: Ints) -> Mapping[int, Arr
     tables = {COLORS: np.array([(*material.base_color, material.alpha) for material in materials], "f4")}
     if scene.shows_emission:
         tables[EMISSIONS] = np.array([(*m.emission, m.emits_both_sides) for m in materials], "f4")
-    if scene.has_gloss or scene.has_cutouts or any(m.normal_texture for m in materials):
+    if scene.has_gloss or any(m.normal_texture for m in materials):
         tables[NUMBERS] = np.array([_pack_numbers(material) for material in materials], "f4")
     if refs:
         tables[LAYERS] = np.where(arrays >= 0, layers, -1).T.astype("f4")
@@ -47,9 +45,8 @@ def _find_refs(scene: Scene) -> list[TextureRef]:
 
 
 def _pack_numbers(material: Material) -> tuple[float, ...]:
-    cutoff = -1.0 if material.alpha_cutoff is None else material.alpha_cutoff
     first = material.metallic, material.roughness, material.specular, material.normal_scale
-    return (*first, *find_head_on(material), cutoff)
+    return (*first, *find_head_on(material), 0.0)
 
 
 def _pack_transform(ref: TextureRef | None) -> tuple[float, ...]:

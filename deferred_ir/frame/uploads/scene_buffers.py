@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.frame.uploads.cluster_buffers import ClusterBuffers
+from deferred_ir.frame.uploads.coverage import list_cut_faces, make_cut_mesh, pack_coverage, place_corners
 from deferred_ir.frame.uploads.material_tables import describe_materials, pack_materials
 from deferred_ir.frame.uploads.scene_textures import SceneTextures
 from deferred_ir.gl.context import Gpu
@@ -40,6 +41,7 @@ class SceneBuffers:
     def __init__(self, gpu: Gpu, scene: Scene, *, general: bool = False) -> None:
         self.gpu, g = gpu, scene.geometry
         self._geometry, self._poses = g, g.poses.copy()
+        self._scene = scene
         self._textures = SceneTextures(gpu, scene.materials, scene.textures)
         uvs = g.uvs if scene.textures else None
         arrays = {"position": g.positions, "normal": g.normals, "color": g.colors, "uv": uvs}
@@ -73,7 +75,9 @@ class SceneBuffers:
         self._faces = ctx.buffer(faces.tobytes())
         self._materials = {
             binding: ctx.buffer(table.tobytes())
-            for binding, table in pack_materials(scene, self._textures.layers, self._textures.arrays).items()
+            for binding, table in (
+                pack_materials(scene, self._textures.layers, self._textures.arrays) | pack_coverage(scene)
+            ).items()
         }
         gpu.gl.check(f"scene '{scene.name}' with {len(g.faces)} triangles")
         self.face_count = len(g.faces)
@@ -113,17 +117,60 @@ class SceneBuffers:
             self._clustered[OWN] = ClusterBuffers(self.gpu, self._own, self._attributes["position"][0])
         return self._clustered[OWN]
 
+    @property
+    def map_meshes(self) -> list[ClusterBuffers]:
+        """What maps draw: the scene's triangles, or those that are whole and those that have holes."""
+        if not len(self._cut_faces):
+            return [self.cluster_buffers]
+        return [*self._whole_mesh, self.cut_mesh]
+
+    @cached_property
+    def _cut_faces(self) -> Ints:
+        return list_cut_faces(self._scene)
+
+    @cached_property
+    def whole_geometry(self) -> Geometry | None:
+        """The triangles that have no holes, at rest; None if all have."""
+        rest = self._scene.geometry.rest
+        if not len(self._cut_faces):
+            return rest
+        whole = np.delete(np.arange(len(rest.faces)), self._cut_faces)
+        kept = replace(rest, faces=rest.faces[whole], face_materials=rest.face_materials[whole])
+        return kept if len(whole) else None
+
+    @property
+    def _whole_mesh(self) -> list[ClusterBuffers]:
+        geometry = self.whole_geometry
+        return [] if geometry is None else [self.stand_in("whole", lambda: MapMesh.from_geometry(geometry))]
+
+    @property
+    def cut_mesh(self) -> ClusterBuffers:
+        """The triangles that have holes, which there are."""
+        faces = self._cut_faces
+        return self.stand_in(
+            "cut",
+            lambda: make_cut_mesh(self._scene.geometry, faces),
+            corners=lambda: place_corners(self._scene, faces),
+        )
+
     def stand_in(
-        self, key: Hashable, make: Callable[[], MapMesh], cluster: Callable[[MapMesh], Clusters] = MapMesh.make_clusters
+        self,
+        key: Hashable,
+        make: Callable[[], MapMesh],
+        cluster: Callable[[MapMesh], Clusters] = MapMesh.make_clusters,
+        corners: Callable[[], Array] | None = None,
     ) -> ClusterBuffers:
         """Return another mesh to draw instead of the scene, in clusters, which is cached by `key` as long as the scene.
 
-        make: builds it, with as many moving models as the scene; cluster: groups its triangles. Both are called once.
+        make: builds it, with as many moving models as the scene; cluster: groups its triangles; corners: returns what
+        programs read as `cut_corner`, (V, 3). They are called once.
         """
         if key not in self._clustered:
             mesh, poses = make(), self._geometry.poses
+            held = None if corners is None else self.gpu.ctx.buffer(np.ascontiguousarray(corners(), "f4").tobytes())
+            self._buffers += [] if held is None else [held]
             self._buffers.append(self.gpu.ctx.buffer(np.ascontiguousarray(mesh.positions, "f4").tobytes()))
-            made = ClusterBuffers(self.gpu, mesh.pose(cluster(mesh), poses), self._buffers[-1])
+            made = ClusterBuffers(self.gpu, mesh.pose(cluster(mesh), poses), self._buffers[-1], held)
             for number, pose in enumerate(poses):
                 made.move(number, pose)
             self._clustered[key] = made

@@ -6,8 +6,8 @@ struct MaterialNumbers {
     float roughness;
     float specular;
     float normal_scale;
-    vec3 head_on;        // reflectance of its coat head-on, before `specular`
-    float alpha_cutoff;  // below 0: nothing is cut
+    vec3 head_on;  // reflectance of its coat head-on, before `specular`
+    float unused;
 };
 
 layout(std430, binding = 3) readonly buffer Numbers { MaterialNumbers material_numbers[]; };

@@ -2,8 +2,11 @@
 // World space. Buffers and defines come from deferred_ir/frame/uploads/scene_buffers.py.
 #include "lib/camera/frame.glsl"
 #include "lib/surface/textures.glsl"
-#if GLOSSY || CUT || NORMAL_TEXTURES
+#if GLOSSY || NORMAL_TEXTURES
 #include "lib/surface/material.glsl"
+#endif
+#if CUT
+#include "lib/surface/coverage.glsl"
 #endif
 
 layout(std430, binding = 0) readonly buffer Faces { vec4 faces[]; };          // geometric normal, material's number
@@ -56,15 +59,14 @@ vec3 bent_normal(int material, vec3 normal) {
 #endif
 
 #if CUT
-// Whether the surface is not there: its coverage, read as rays do, is below its material's threshold.
+// Whether the surface is not there.
 bool is_cut() {
     int material = int(faces[face_number()].w);
-    float coverage = materials[material].a;
 #if BASE_COLOR_TEXTURES
-    vec3 place = texture_place(material, BASE_COLOR);
-    if (place.z >= 0.0) coverage *= textureLod(base_color_texture, place, 0.0).a;
+    return is_cut(material, texture_place(material, BASE_COLOR).xy);
+#else
+    return is_cut(material, vec2(0.0));
 #endif
-    return coverage < material_numbers[material].alpha_cutoff;
 }
 #endif
 

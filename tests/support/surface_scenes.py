@@ -20,8 +20,8 @@ LATTICE = np.indices((8, 8)).sum(axis=0) % 2 * 255
 def lattice(wrap: Wrap = "repeat", cutoff: float | None = 0.5) -> Scene:
     """A lattice below the light of a closed room, its image repeated one and a half times as `wrap` says."""
     bare = build(
-        box((-1, -1, -1), (1, 1, 1), (0.7, 0.7, 0.7)),
-        quad((-0.5, -0.2, 0.6), (0.6, -0.2, 0.6), (0.6, 0.1, -0.6), (0.2, 0.7, 0.2)),
+        box((-1, -1, -1), (1, 1, 1), (0.75, 0.75, 0.75)),  # no rounding in half floats
+        quad((-0.5, -0.2, 0.6), (0.6, -0.2, 0.6), (0.6, 0.1, -0.6), (0.25, 0.75, 0.25)),
         camera=Camera((0.1, 0.5, 0.95), (0.0, -0.4, -0.3), fov=75.0),
         spotlight=Spotlight((-0.2, 0.9, 0.2), (0.1, -1.0, -0.1), 110.0, (3.0, 2.5, 2.0)),
     )

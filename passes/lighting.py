@@ -46,6 +46,7 @@ class Lighting(Pass):
         "normals": Input("shading and geometric normal", format="rgba16"),
         "albedo": Input("reflectance", format="rgba16f"),
         "material": Input("roughness, metallic and material", format="rgba16", optional=True),
+        "reflections": Input("what gloss reflects, of which lights add no more", format="rgba32f", optional=True),
         "emission": Input("what surfaces emit", format="rgba32f", optional=True),
         "environment": Input("what shows behind everything", format="rgba32f", optional=True),
         "tiles": Input("which VPLs may light which tiles of the screen", format="rg32ui", optional=True),

@@ -24,6 +24,9 @@ layout(binding = UNIT_ALBEDO) uniform sampler2D albedo;
 #if HAS_MATERIAL
 layout(binding = UNIT_MATERIAL) uniform sampler2D material;
 #endif
+#if HAS_REFLECTIONS
+layout(binding = UNIT_REFLECTIONS) uniform sampler2D reflections;
+#endif
 #if HAS_EMISSION
 layout(binding = UNIT_EMISSION) uniform sampler2D emission;
 #endif
@@ -144,6 +147,10 @@ void main() {
 #else
     for (int i = 0; i < count; ++i) add_vpl(r, vpls[i], p);
 #endif
+#endif
+#if GLOSSY && HAS_REFLECTIONS
+    vec3 share = share_reflectance(p.gloss, dot(p.shading_normal, p.to_viewer));
+    if (first) r.glossy += texelFetch(reflections, pixel, 0).rgb * share;
 #endif
     radiance = vec4(reflected_radiance(r, color), 1.0);
 #if HAS_EMISSION

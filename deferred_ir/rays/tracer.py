@@ -22,6 +22,7 @@ from deferred_ir.rays.embree import INFINITE, EmbreeScenes
 from deferred_ir.scene.scene import Scene
 from deferred_ir.scene.surfaces.brdf import Gloss
 from deferred_ir.scene.surfaces.points import SurfacePoints
+from deferred_ir.scene.vertices import find_weights
 
 CHUNK = 1 << 15
 OFFSET = 1e-5
@@ -146,6 +147,21 @@ class Tracer:
             return Hits(face, position, normal, shading, albedo)
         albedo[hit], gloss = at.look_up_gloss(base)
         return Hits(face, position, normal, shading, albedo, gloss.spread(hit))
+
+    def find_emission(self, hits: Hits, directions: Array) -> Array:
+        """Return the radiance that hits (n,) of rays in `directions` (n, 3) emit against them, float64 (n, 3)."""
+        scene, radiance = self.scene, np.zeros((len(hits.face), 3))
+        rows = np.flatnonzero(hits.hit) if scene.shows_emission else np.zeros(0, int)
+        materials = scene.geometry.face_materials[hits.face[rows]]
+        both = np.array([material.emits_both_sides for material in scene.materials], bool)[materials]
+        front = np.einsum("ij,ij->i", scene.geometry.face_normals[hits.face[rows]], directions[rows]) < 0
+        rows = rows[front | both]
+        if len(rows):
+            faces = hits.face[rows]
+            weights = find_weights(hits.position[rows], scene.geometry.positions[scene.geometry.faces[faces]])
+            points = SurfacePoints(scene.geometry, scene.materials, scene.textures, faces, weights)
+            radiance[rows] = points.look_up_emission()
+        return radiance
 
     def occluded(self, origins: Array, targets: Array, *, lifted: bool = False) -> Bools:
         """Return whether anything lies strictly between points (n, 3) and (n, 3), bool (n,).

@@ -94,6 +94,11 @@ def shadow_rays(seed: int, task: int) -> Stream:
     return np.random.default_rng([seed, 1 + task, 1])
 
 
+def reflections(seed: int, task: int) -> Stream:
+    """Return the stream of the rays of reflections in one task."""
+    return np.random.default_rng([seed, task, 4])
+
+
 def incremental_vpls(seed: int) -> Stream:
     """Return the stream that places the sites of VPLs that outlive their frame."""
     return np.random.default_rng(seed)

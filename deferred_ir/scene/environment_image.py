@@ -120,6 +120,16 @@ class EnvironmentImage:
         density = means[row, column] / self.flux if self.flux > 0 else np.full(len(square), np.inf)
         return directions, density
 
+    def find_density(self, directions: Array) -> Array:
+        """Return the density with which `draw` draws unit `directions` (n, 3), (n,)."""
+        means, _, _, cosines = self._table
+        height, width = means.shape
+        row = np.clip(np.searchsorted(-cosines, -directions[:, 1], side="right") - 1, 0, height - 1)
+        turn = np.arctan2(directions[:, 0], -directions[:, 2]) / (2 * np.pi) + 0.5
+        column = np.clip((turn * width).astype(np.int64), 0, width - 1)
+        density: Array = means[row, column] / max(self.flux, np.finfo(float).tiny)
+        return density
+
 
 def read_image(path: str | os.PathLike[str]) -> EnvironmentImage:
     """Read an .hdr, .exr or .png file; .png is decoded from sRGB. Raises SceneError."""

@@ -6,6 +6,7 @@ It is no kind that a scene file names: materials say which surfaces emit.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +15,7 @@ from deferred_ir.base.arrays import Array, Ints, Vec3
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.sampling.warps import disc_to_square, lift_to_hemisphere
 from deferred_ir.scene.geometry import Geometry
-from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples, aim
+from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples, Meetings, aim
 from deferred_ir.scene.surfaces.materials import Material, Texture
 from deferred_ir.scene.surfaces.points import SurfacePoints
 
@@ -52,8 +53,8 @@ class SurfaceLight:
         """Add up the chances."""
         object.__setattr__(self, "_ends", np.cumsum(self.chances))
 
-    def _draw(self, square: Array) -> tuple[Array, Array, Array]:
-        """Return points, unit normals of the sides that shine, and radiance over density by area, (n, 3) each."""
+    def _draw(self, square: Array) -> tuple[Array, Array, Array, Array]:
+        """Return points, unit normals of the sides that shine, radiance over density, (n, 3) each; density by area."""
         mark = square[:, 0] * self._ends[-1]
         row = np.minimum(np.searchsorted(self._ends, mark, side="right"), len(self.faces) - 1)
         before = np.where(row > 0, self._ends[row - 1], 0.0)
@@ -65,12 +66,17 @@ class SurfaceLight:
         position = np.einsum("nij,ni->nj", corners, weights)
         radiance = SurfacePoints(self.geometry, self.materials, self.textures, faces, weights).look_up_emission()
         density = self.chances[row] / self.geometry.face_areas[faces]
-        return position, self.geometry.face_normals[faces] * self.sides[row][:, None], radiance / density[:, None]
+        return (
+            position,
+            self.geometry.face_normals[faces] * self.sides[row][:, None],
+            radiance / density[:, None],
+            density,
+        )
 
     def emit(self, points: Array, places: Array | None, bounds: Bounds) -> Flux:
         """Return rays that leave places on them, cosine-distributed."""
         assert places is not None
-        position, normal, weight = self._draw(disc_to_square(places))
+        position, normal, weight, _ = self._draw(disc_to_square(places))
         return position + normal * (LIFT * bounds.radius), lift_to_hemisphere(points, normal), weight / len(points)
 
     def measure_flux(self, bounds: Bounds) -> float:
@@ -81,17 +87,41 @@ class SurfaceLight:
     def spread(self, square: Array, bounds: Bounds) -> LightSamples:
         """Return points on them."""
         del bounds
-        position, normal, weight = self._draw(square)
+        position, normal, weight, _ = self._draw(square)
         return LightSamples(position, normal, weight / len(square))
 
     def sample(self, at: Array, places: Array | None, bounds: Bounds) -> Arrivals:
         """Return what arrives from a place on them."""
         del bounds
         assert places is not None
-        source, normal, weight = self._draw(disc_to_square(places))
+        source, normal, weight, by_area = self._draw(disc_to_square(places))
         to, square = aim(source, at)
         facing = np.maximum(-np.einsum("ij,ij->i", to, normal), 0)
-        return Arrivals(to, source, weight * (facing / square)[:, None])
+        density = np.divide(by_area * square, facing, out=np.full(len(to), np.inf), where=facing > 0)
+        return Arrivals(to, source, weight * (facing / square)[:, None], density)
+
+    def meet(self, origins: Array, directions: Array) -> Meetings:
+        """Return that no ray meets it: rays hit the surfaces themselves."""
+        del directions
+        return Meetings(np.full(len(origins), np.inf), np.zeros(origins.shape), np.zeros(len(origins)))
+
+    def find_density(self, faces: Ints, directions: Array, distances: Array) -> Array:
+        """Return the density with which `sample` draws unit `directions` (n, 3) to points of `faces` (n,), (n,).
+
+        distances: to the points, (n,). It is 0 on faces, and from sides, that do not emit.
+        """
+        cosines = -np.einsum("ij,ij->i", directions, self.geometry.face_normals[faces])
+        chances = np.where(cosines > 0, self._chances[0, faces], self._chances[1, faces])
+        area = np.maximum(self.geometry.face_areas[faces] * np.abs(cosines), np.finfo(float).tiny)
+        density: Array = chances * distances**2 / area
+        return density
+
+    @cached_property
+    def _chances(self) -> Array:
+        """Chances of the fronts and of the backs of all faces, (2, F)."""
+        chances = np.zeros((2, len(self.geometry.faces)))
+        np.add.at(chances, (np.where(self.sides > 0, 0, 1), self.faces), self.chances)
+        return chances
 
     def at(self, time: float) -> SurfaceLight:
         """Return itself: it is that of a scene at rest."""

@@ -33,6 +33,16 @@ def find_groups(faces: Ints, ranges: Sequence[slice]) -> Ints:
     return groups
 
 
+def find_weights(points: Array, corners: Array) -> Array:
+    """Return the barycentric weights of points (n, 3) in the planes of triangles (n, 3, 3), float64 (n, 3)."""
+    a, b, c = (corners[:, i] for i in range(3))
+    whole = np.cross(b - a, c - a)
+    square = np.maximum(np.einsum("ij,ij->i", whole, whole), np.finfo(float).tiny)
+    second = np.einsum("ij,ij->i", np.cross(points - a, c - a), whole) / square
+    third = np.einsum("ij,ij->i", np.cross(b - a, points - a), whole) / square
+    return np.stack([1 - second - third, second, third], axis=1)
+
+
 def compute_face_areas(positions: Array, faces: Ints) -> Array:
     """Compute the areas of `faces` (F, 3), float64 (F,)."""
     a, b, c = (positions[faces[:, i]] for i in range(3))

@@ -49,12 +49,27 @@ class Arrivals:
     """Light that arrives at n surfaces from one point of a light each.
 
     to: unit directions towards it, (n, 3). ends: where shadow rays end, (n, 3). strength: irradiance on planes that
-    face it, without shadows, over the light's emission, (n,) or, where colours differ over the light, (n, 3).
+    face it, without shadows, over the light's emission, (n,) or, where colours differ over the light, (n, 3). density:
+    of the directions over solid angle, (n,), of a sampled light.
     """
 
     to: Array
     ends: Array
     strength: Array
+    density: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Meetings:
+    """Where n rays meet a light, if nothing lies between.
+
+    distance: (n,), infinite where they miss. radiance: (n, 3), 0 there. density: with which the light's `sample` draws
+    these directions, over solid angle, (n,).
+    """
+
+    distance: Array
+    radiance: Array
+    density: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +151,12 @@ class SampledLight(Light, Protocol):
 
     def spread(self, square: Array, bounds: Bounds) -> LightSamples:
         """Return points that stand for it together. square: of the unit square, (n, 2), evenly spread."""
+
+    def meet(self, origins: Array, directions: Array) -> Meetings:
+        """Return where rays from `origins` (n, 3) in unit `directions` (n, 3) meet it.
+
+        Emitting surfaces, which rays hit themselves, are never met.
+        """
 
 
 def is_direct(light: Any) -> TypeGuard[DirectLight]:

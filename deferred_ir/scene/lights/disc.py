@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.base.arrays import Array, Bools, Vec3
 from deferred_ir.sampling.warps import build_basis
 from deferred_ir.scene.lights.base import Bounds
 from deferred_ir.scene.lights.fields import Fault
@@ -44,6 +44,11 @@ class Disc(FlatLight):
         right, up = build_basis(self.axis)
         points: Array = np.asarray(self.position, float) + self.radius * (places[:, :1] * right + places[:, 1:] * up)
         return points
+
+    def covers(self, offsets: Array) -> Bools:
+        """Return whether points lie within its radius."""
+        inside: Bools = np.einsum("ij,ij->i", offsets, offsets) <= self.radius**2
+        return inside
 
     def outline(self, bounds: Bounds) -> Array:
         """Return its edge and its normal."""

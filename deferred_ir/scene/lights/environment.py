@@ -14,7 +14,7 @@ from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.sampling.warps import disc_to_square, square_to_sphere
 from deferred_ir.scene.environment_image import EnvironmentImage, read_image
-from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples, end_outside, enter
+from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples, Meetings, end_outside, enter
 from deferred_ir.scene.lights.fields import CheckedLight, Fault
 from deferred_ir.scene.outlines import draw_arrow, draw_circle
 
@@ -84,17 +84,21 @@ class Environment(CheckedLight):
         )
         return turned
 
-    def _draw(self, square: Array) -> tuple[Array, Array]:
-        """Return unit directions towards it (n, 3), and radiance over emission and their density over solid angle."""
+    def _draw(self, square: Array) -> tuple[Array, Array, Array]:
+        """Return unit directions towards it (n, 3), radiance over emission and density, (n, 3), and the density, (n,).
+
+        The density is over solid angle.
+        """
         if self.image is None:
-            return square_to_sphere(square), np.full((len(square), 3), 4 * np.pi)
+            over = 4 * np.pi
+            return square_to_sphere(square), np.full((len(square), 3), over), np.full(len(square), 1 / over)
         local, density = self.image.draw(square)
-        return self._turn(local, 1), self.image.look_up(local) / density[:, None]
+        return self._turn(local, 1), self.image.look_up(local) / density[:, None], density
 
     def emit(self, points: Array, places: Array | None, bounds: Bounds) -> Flux:
         """Return rays from all around: `points` say where they enter, `places` from where they come."""
         assert places is not None
-        to, weight = self._draw(disc_to_square(places))
+        to, weight, _ = self._draw(disc_to_square(places))
         carried = weight * self.emission * (bounds.radius**2 / len(points))
         return enter(-to, points, bounds), -to, carried
 
@@ -109,14 +113,21 @@ class Environment(CheckedLight):
 
     def spread(self, square: Array, bounds: Bounds) -> LightSamples:
         """Return directions that stand for it; positions lie on the bounds."""
-        to, weight = self._draw(square)
+        to, weight, _ = self._draw(square)
         return LightSamples(np.asarray(bounds.centre) + bounds.radius * to, -to, weight * self.emission / len(square))
 
     def sample(self, at: Array, places: Array | None, bounds: Bounds) -> Arrivals:
         """Return what arrives from one direction each."""
         assert places is not None
-        to, weight = self._draw(disc_to_square(places))
-        return Arrivals(to, end_outside(at, to, bounds), weight)
+        to, weight, density = self._draw(disc_to_square(places))
+        return Arrivals(to, end_outside(at, to, bounds), weight, density)
+
+    def meet(self, origins: Array, directions: Array) -> Meetings:
+        """Return that every ray meets it, far away."""
+        density = np.full(len(origins), 1 / (4 * np.pi))
+        if self.image is not None:
+            density = self.image.find_density(self._turn(directions, -1))
+        return Meetings(np.full(len(origins), np.finfo(float).max), self.look_up(directions), density)
 
     def at(self, time: float) -> Environment:
         """Return itself: it does not move."""

@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.base.arrays import Array, Bools, Vec3
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.sampling.warps import lift_to_hemisphere, square_to_disc
-from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples, aim
+from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples, Meetings, aim
 from deferred_ir.scene.lights.fields import Fault, PlacedLight
 
 
@@ -26,6 +26,10 @@ class FlatLight(PlacedLight):
     @abstractmethod
     def area(self) -> float:
         """Its area, square scene units."""
+
+    @abstractmethod
+    def covers(self, offsets: Array) -> Bools:
+        """Return whether points of its plane, as offsets (n, 3) from its middle, are on it, bool (n,)."""
 
     @abstractmethod
     def locate(self, places: Array) -> Array:
@@ -70,4 +74,23 @@ class FlatLight(PlacedLight):
         assert places is not None
         source = self.locate(places)
         to, square = aim(source, at)
-        return Arrivals(to, source, self.area * np.maximum(-(to @ self.axis), 0) / square)
+        over = self.area * np.maximum(-(to @ self.axis), 0) / square
+        return Arrivals(to, source, over, _invert(over))
+
+    def meet(self, origins: Array, directions: Array) -> Meetings:
+        """Return where rays meet its front."""
+        against, height = -(directions @ self.axis), (origins - np.asarray(self.position, float)) @ self.axis
+        ahead = (against > 0) & (height > 0)
+        distance = np.divide(height, against, out=np.full(len(height), np.inf), where=ahead)
+        at = np.where(ahead, distance, 0)[:, None] * directions + origins - np.asarray(self.position, float)
+        hit = ahead & self.covers(at)
+        distance[~hit] = np.inf
+        density = np.zeros(len(distance))
+        density[hit] = _invert(self.area * against[hit] / distance[hit] ** 2)
+        return Meetings(distance, np.multiply.outer(hit.astype(float), np.asarray(self.radiance)), density)
+
+
+def _invert(values: Array) -> Array:
+    """Return 1 over values (n,), infinite for 0."""
+    inverse: Array = np.divide(1, values, out=np.full(len(values), np.inf), where=values > 0)
+    return inverse

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from deferred_ir.base.arrays import Array, Vec3
+from deferred_ir.base.arrays import Array, Bools, Vec3
 from deferred_ir.base.errors import format_value
 from deferred_ir.sampling.warps import disc_to_square
 from deferred_ir.scene.lights.base import Bounds
@@ -62,6 +62,13 @@ class Rect(FlatLight):
         square = disc_to_square(places) - 0.5
         points: Array = np.asarray(self.position, float) + square[:, :1] * across + square[:, 1:] * along
         return points
+
+    def covers(self, offsets: Array) -> Bools:
+        """Return whether points lie within its sides."""
+        inside = np.ones(len(offsets), bool)
+        for side in self._sides:
+            inside &= np.abs(offsets @ side) <= side @ side / 2
+        return inside
 
     def outline(self, bounds: Bounds) -> Array:
         """Return its edges and its normal."""

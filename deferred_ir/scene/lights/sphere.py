@@ -11,7 +11,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Vec3
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.sampling.warps import build_basis, disc_to_sphere, lift_to_hemisphere, square_to_sphere
-from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples
+from deferred_ir.scene.lights.base import Arrivals, Bounds, Flux, LightSamples, Meetings
 from deferred_ir.scene.lights.fields import Fault, PlacedLight
 from deferred_ir.scene.motion import LightMotion
 from deferred_ir.scene.outlines import draw_ball
@@ -71,6 +71,21 @@ class Sphere(PlacedLight):
         assert places is not None
         return sample_ball(np.asarray(self.position, float), self.radius, at, places)
 
+    def meet(self, origins: Array, directions: Array) -> Meetings:
+        """Return where rays meet it from outside."""
+        way = np.asarray(self.position, float) - origins
+        along = np.einsum("ij,ij->i", way, directions)
+        side = way - along[:, None] * directions
+        square = self.radius**2 - np.einsum("ij,ij->i", side, side)
+        away = np.einsum("ij,ij->i", way, way)
+        outside = away > self.radius**2
+        hit = (square > 0) & (along > 0) & outside
+        distance = np.where(hit, along - np.sqrt(np.maximum(square, 0)), np.inf)
+        sine_squared = np.where(outside, self.radius**2 / np.maximum(away, np.finfo(float).tiny), 1)
+        cap = sine_squared / (1 + np.sqrt(1 - sine_squared))
+        radiance = np.multiply.outer(hit.astype(float), np.asarray(self.radiance))
+        return Meetings(distance, radiance, np.where(hit, 1 / (2 * np.pi * cap), 0.0))
+
     def outline(self, bounds: Bounds) -> Array:
         """Return circles of it."""
         del bounds
@@ -98,7 +113,8 @@ def sample_ball(centre: Array, radius: float, at: Array, places: Array) -> Arriv
     to = part[:, :1] * right + part[:, 1:] * up + (1 - along)[:, None] * axis
     reach = distance * (1 - along)
     near = reach - np.sqrt(np.maximum(radius**2 - distance**2 * across**2, 0))
-    return Arrivals(to, at + to * near[:, None], np.where(outside, 2 * np.pi * cap, 0.0))
+    over = 2 * np.pi * cap
+    return Arrivals(to, at + to * near[:, None], np.where(outside, over, 0.0), 1 / over)
 
 
 LIGHT = Sphere

@@ -15,6 +15,11 @@ float weigh_grazing(float cosine) {
     return square * square * off;
 }
 
+// About the share of light that gloss reflects, by which reflections are divided while they are filtered.
+vec3 share_reflectance(Gloss gloss, float cosine) {
+    return max(mix(gloss.f0, vec3(gloss.f90), weigh_grazing(cosine)), 0.02);
+}
+
 // GGX: the sine by a cross product, since 1 - cos^2 has no digits left in a narrow lobe.
 float distribute(float alpha, vec3 normal, vec3 middle) {
     vec3 side = cross(normal, middle);

@@ -57,6 +57,11 @@ class FilterReflections(Pass):
             return "no surface is glossy"
         return None if facts[EMITS] else "nothing shines"
 
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
+        """Say that reflections are filtered."""
+        del facts, inputs
+        return "the filter blurs reflections within their lobes" if self.params.steps else None
+
     def depends(self) -> frozenset[str]:
         """The camera, from which the lobes are seen."""
         return frozenset({"camera", "models"})

@@ -14,12 +14,14 @@ import numpy as np
 
 from deferred_ir.base.arrays import Ints
 from deferred_ir.frame.direct_lights import LIGHTS_PER_BLOCK
+from deferred_ir.frame.facts import BLURRED_GLOSS, GLOSS
 from deferred_ir.frame.frame import Frame, describe_environment
 from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.uploads.mipmaps import MipmapParams
 from deferred_ir.frame.vpl_buffer import VPLS_PER_BLOCK, find_spread
 from deferred_ir.gl.shaders import Define
+from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
@@ -57,6 +59,11 @@ class Forward(Pass):
         """Radiance in 32 bits: a half float would lose the smaller of 256 terms."""
         del inputs
         return {"radiance": Output("radiance, linear RGB; alpha 0 on the background", Texture("rgba32f"))}
+
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
+        """Say what VPLs do to gloss."""
+        del inputs
+        return BLURRED_GLOSS if facts[GLOSS] else None
 
     def depends(self) -> frozenset[str]:
         """The camera and the models; the lights come as inputs."""

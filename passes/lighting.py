@@ -11,12 +11,14 @@ from typing import ClassVar
 
 import numpy as np
 
+from deferred_ir.frame.facts import BLURRED_GLOSS, GLOSS
 from deferred_ir.frame.frame import Frame, describe_environment
 from deferred_ir.frame.light_culling import find_shining
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.frame.screen_tiles import TILES, count_pairs
 from deferred_ir.frame.vpl_buffer import BINDING, VPL, VPLS_PER_BLOCK, find_spread
 from deferred_ir.gl.shaders import Program
+from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.figures import Figure
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
@@ -71,6 +73,12 @@ class Lighting(Pass):
                 transient=True,
             )
         }
+
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
+        """Say what VPLs do to gloss."""
+        if not facts[GLOSS]:
+            return None
+        return None if inputs["reflections"] else BLURRED_GLOSS
 
     def depends(self) -> frozenset[str]:
         """The camera and, through the near plane, the scene: positions are reconstructed from the depth."""

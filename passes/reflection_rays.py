@@ -63,6 +63,11 @@ class ReflectionRays(Pass):
             return "no surface is glossy"
         return None if facts[EMITS] else "nothing shines"
 
+    def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
+        """Say what of light paths is left out."""
+        del facts, inputs
+        return "none of the light of gloss goes on to matt surfaces (caustics)"
+
     def depends(self) -> frozenset[str]:
         """What the camera sees, and how the light falls on all of the scene."""
         return frozenset({"camera", "light", "models", "seed"})

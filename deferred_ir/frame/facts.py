@@ -24,6 +24,10 @@ ENVIRONMENT = Fact[tuple[int, int] | None](
 )
 EMISSION = Fact("emission", unknown=True, doc="Surfaces are seen to emit.")
 GLOSS = Fact("gloss", unknown=True, doc="Surfaces are glossy.")
+BLURRED_GLOSS = (
+    "VPLs are spots in gloss, which blurs what they stand for; none comes from gloss to matt surfaces (caustics)"
+)
+"""The error of pictures whose gloss shows VPLs."""
 SOFTWARE = Fact("software", unknown=True, doc="OpenGL draws on the CPU.")
 
 

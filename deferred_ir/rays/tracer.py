@@ -20,7 +20,7 @@ from deferred_ir.base.arrays import Array, Bools, Ints
 from deferred_ir.rays.cutouts import CutOutRays
 from deferred_ir.rays.embree import INFINITE, EmbreeScenes
 from deferred_ir.scene.scene import Scene
-from deferred_ir.scene.surfaces.brdf import Gloss
+from deferred_ir.scene.surfaces.brdf import Gloss, find_mean_kept
 from deferred_ir.scene.surfaces.points import SurfacePoints
 from deferred_ir.scene.vertices import find_weights
 
@@ -51,6 +51,17 @@ class Hits:
     def hit(self) -> Bools:
         """Which rays met a surface, bool (n,)."""
         return self.face >= 0
+
+    def reflect_diffusely(self, directions: Array) -> Array:
+        """Return the fraction of light along unit `directions` (n, 3), the rays', that is reflected diffusely, (n, 3).
+
+        The coat takes more of what goes to some directions than to others; this is about their mean.
+        """
+        if self.gloss is None:
+            return self.albedo
+        cosines = -np.einsum("ij,ij->i", self.shading_normal, directions)
+        reflected: Array = self.albedo * find_mean_kept(self.gloss, cosines)[:, None]
+        return reflected
 
     def rows(self, chosen: Ints) -> Hits:
         """Return the hits of the rays `chosen`, indices (m,)."""

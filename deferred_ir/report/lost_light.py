@@ -64,7 +64,7 @@ def estimate(
     rays = above[found]
     light = AllLight(tracer)
     lit = light.irradiate(hits, rng) * light.unit
-    weight = (lit * hits.albedo * seen.albedo[seen_at[rays]]) @ LUMINANCE
+    weight = (lit * hits.reflect_diffusely(away[rays]) * seen.albedo[seen_at[rays]]) @ LUMINANCE
     total = weight.sum()
     if total <= 0:
         return None

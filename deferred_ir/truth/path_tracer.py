@@ -3,6 +3,11 @@
 So that no fault can hide in both, it shares only ray queries and the camera with them, and has samples and formulas of
 all kinds of light of its own (`emitters`). Camera rays go through the centres of pixels, without a pixel filter. Direct
 light is sampled at each vertex of a path (`lighting`); bounces are cosine-distributed about the shading normal.
+
+What the camera sees reflects by the whole BRDF (`reflection`): its diffuse part begins bounces, and its glossy part a
+path that shows what it meets as the camera would see it, with direct light, bounces and further reflections, up to
+MOST_REFLECTIONS. Bounces are diffuse, and direct light at their ends is reflected diffusely: caustics, light that gloss
+casts on surfaces, are left out.
 """
 
 from __future__ import annotations
@@ -17,21 +22,28 @@ from deferred_ir.base.parallel import run_in_order
 from deferred_ir.base.progress import Progress
 from deferred_ir.rays.tracer import Hits, Tracer
 from deferred_ir.scene.scene import Scene
-from deferred_ir.truth.emitters.base import dot
+from deferred_ir.truth.emitters.base import TINY, dot
 from deferred_ir.truth.lighting import Lighting, make_lattices
+from deferred_ir.truth.reflection import Receivers, normalize
 
 MOST_BATCHES = 16
 """Most batches into which the paths of a pixel are divided, to know their variance."""
 RAYS = 1 << 13
 """Rays of a task: few enough for their arrays to stay in a core's cache."""
 
+MOST_REFLECTIONS = 8
+"""Most glossy reflections that the camera sees one in another; further ones are black."""
+ROULETTE = 0.25
+"""Paths by reflections that weigh less go on by chance, and then weigh this much."""
+
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """Estimated radiance, float64 (H, W, 3), top row first as in image files.
 
-    direct: light that comes to what the camera sees straight from an emitter; indirect: after bounces; both are 0 where
-    the camera ray hits nothing. emission: what the camera sees shining itself, the environment behind all included.
+    direct: light that comes to what the camera sees straight from an emitter; indirect: after bounces, or reflected by
+    gloss as other surfaces show it; both are 0 where the camera ray hits nothing. emission: what the camera sees
+    shining itself, the environment behind all included.
     hit: where the ray hits something, bool (H, W). variance: that of each value of direct + indirect, float64
     (H, W, 3), all independent between pixels; None for a single sample a pixel, which cannot tell it.
     """
@@ -97,8 +109,9 @@ class PathTracer:
         all there are.
         """
         seen = self.trace_camera_rays(size)
+        directions = self._directions(size)
         pixels = np.flatnonzero(seen.hit)
-        noisy = self.bounces > 0 or self._lighting.varies
+        noisy = self.bounces > 0 or self._lighting.varies or seen.gloss is not None
         counts = _split_batches(spp) if noisy else [1]
         per_task = max(1, RAYS // max(counts))
         tasks = [
@@ -111,8 +124,12 @@ class PathTracer:
             number, batch, chosen = task
             rng = np.random.default_rng([seed, number, batch])
             surfaces = seen.rows(chosen)
-            direct = surfaces.albedo / np.pi * self._lighting.sample_well(surfaces, counts[batch], rng)
-            met, indirect = self._follow_bounces(surfaces, counts[batch], rng)
+            at = Receivers.make(surfaces, directions[chosen], show_gloss=True)
+            direct = self._lighting.sample_well(at, counts[batch], rng).leave(surfaces.albedo)
+            met, indirect = self._follow_bounces(at, counts[batch], rng)
+            if at.shows_gloss:
+                shone, reflected = self._follow_reflections(at, counts[batch], rng)
+                return direct + met + shone, indirect + reflected
             return direct + met, indirect
 
         direct, indirect, mean, squares = (np.zeros((len(seen.face), 3)) for _ in range(4))
@@ -136,39 +153,78 @@ class PathTracer:
             None if variance is None else variance.reshape(*shape, 3),
         )
 
-    def _follow_bounces(self, surfaces: Hits, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Follow `count` paths from each surface. Returns two radiances, (n, 3) each, means over the paths.
+    def _follow_bounces(self, at: Receivers, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Follow `count` paths that leave each surface diffusely. Returns two radiances, (n, 3) each, means over paths.
 
         The first is that of emitters that the first ray of a path meets: a part of direct light. The second is light
         after 1 to `bounces` bounces.
         """
-        paths = np.arange(len(surfaces.face) * count)
+        surfaces = len(at.hits.face)
+        paths = np.arange(surfaces * count)
         met, total = np.zeros((len(paths), 3)), np.zeros((len(paths), 3))
-        at = surfaces.rows(paths // count)
-        weight = at.albedo
+        at = at.rows(paths // count)
+        weight = at.hits.albedo
         # The last rays only look for emitters.
         for bounce in range(self.bounces + bool(self._lighting.met)):
             if len(paths) == 0:
                 break
-            points = rng.random((len(paths), 2)) if bounce else make_lattices(len(surfaces.face), count, rng)
+            points = rng.random((len(paths), 2)) if bounce else make_lattices(surfaces, count, rng)
             # A unit normal plus a point of the unit sphere is cosine-distributed; its length does not matter.
-            directions = at.shading_normal + _map_to_sphere(points)
-            up = np.flatnonzero(dot(directions, at.normal) > 0)
-            origins = self.tracer.lift(at.position[up], at.normal[up])
+            directions = at.hits.shading_normal + _map_to_sphere(points)
+            if at.to_viewer is not None:
+                weight = weight * at.keep(normalize(directions))[:, None]
+            up = np.flatnonzero(dot(directions, at.hits.normal) > 0)
+            origins = self.tracer.lift(at.hits.position[up], at.hits.normal[up])
             found = self.tracer.closest(origins, directions[up])
             if self._lighting.met:
                 unit = directions[up] / np.linalg.norm(directions[up], axis=1, keepdims=True)
-                radiance = self._lighting.meet(origins, unit, dot(unit, at.shading_normal[up]), found)
+                radiance = self._lighting.meet(origins, unit, dot(unit, at.hits.shading_normal[up]), found)
                 (total if bounce else met)[paths[up]] += weight[up] * radiance
             if bounce == self.bounces:
                 break
             landed = np.flatnonzero(found.hit)
             rows = up[landed]
-            start, at = at.position[rows], found.rows(landed)
-            paths, weight = paths[rows], weight[rows] * at.albedo
+            start, normal = at.hits.position[rows], at.hits.normal[rows]
+            at = Receivers.make(found.rows(landed), directions[rows], show_gloss=False)
+            paths, weight = paths[rows], weight[rows] * at.hits.albedo
             if bounce == 0:
-                weight *= self._attenuate_as_vpls(start - at.position, at.normal)[:, None]
-            total[paths] += weight / np.pi * self._lighting.sample(at, rng)
+                weight *= self._attenuate_as_vpls(at.hits.position - start, normal)[:, None]
+            total[paths] += weight / np.pi * self._lighting.sample(at, rng).irradiance
+        return met.reshape(-1, count, 3).mean(axis=1), total.reshape(-1, count, 3).mean(axis=1)
+
+    def _follow_reflections(self, at: Receivers, count: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Follow `count` glossy reflections of each surface. Returns two radiances, (n, 3) each, means over paths.
+
+        The first is that of emitters that the first ray of a path meets: a part of direct light. The second is that of
+        what reflections show, further ones and bounces included.
+        """
+        surfaces = len(at.hits.face)
+        paths = np.arange(surfaces * count)
+        met, total = np.zeros((len(paths), 3)), np.zeros((len(paths), 3))
+        points = make_lattices(surfaces, count, rng)
+        at, weight = at.rows(paths // count), np.ones((len(paths), 3))
+        for reflection in range(MOST_REFLECTIONS):
+            directions = at.draw(points)
+            density = at.find_density(directions)
+            cosine = np.maximum(dot(directions, at.hits.shading_normal), 0)
+            weight = weight * at.reflect(directions) * (cosine / np.maximum(density, TINY))[:, None]
+            up = np.flatnonzero((dot(directions, at.hits.normal) > 0) & weight.any(axis=1))
+            origins = self.tracer.lift(at.hits.position[up], at.hits.normal[up])
+            found = self.tracer.closest(origins, directions[up])
+            radiance = self._lighting.meet_by_gloss(origins, directions[up], density[up], found)
+            (total if reflection else met)[paths[up]] += weight[up] * radiance
+            chance = np.minimum(weight[up].max(axis=1) / ROULETTE, 1)
+            going = np.flatnonzero(found.hit & (rng.random(len(up)) < chance))
+            if len(going) == 0:
+                break
+            rows = up[going]
+            at = Receivers.make(found.rows(going), directions[rows], show_gloss=True)
+            paths, weight = paths[rows], weight[rows] / chance[going, None]
+            shown = self._lighting.sample(at, rng).leave(at.hits.albedo)
+            for part in self._follow_bounces(at, 1, rng):
+                shown += part
+            total[paths] += weight * shown
+            points = rng.random((len(paths), 2))
         return met.reshape(-1, count, 3).mean(axis=1), total.reshape(-1, count, 3).mean(axis=1)
 
     def _attenuate_as_vpls(self, ways: Array, normals: Array) -> Array:

@@ -2,8 +2,8 @@
 1997).
 
 Each of N rays carries its part of a light's flux; one with flux P makes a VPL of intensity P rho/pi cos(theta). As N
-grows, their sum is exactly one diffuse bounce. Lights get rays by their luminous flux: each the whole number below or
-above its share, and over the seeds its share exactly, however small.
+grows, their sum is exactly one diffuse bounce. Of glossy surfaces they carry the diffuse part. Lights get rays by their
+luminous flux: each the whole number below or above its share, and over the seeds its share exactly, however small.
 
 Further bounces continue the paths. From the VPLs of one bounce, M are drawn by systematic resampling with probability
 proportional to their luminous power, and a ray leaves each about its normal, cosine-distributed. M falls from bounce to
@@ -128,6 +128,7 @@ def deal_rays(lights: Sequence[L], bounds: Bounds, count: int, seed: int) -> Ite
 def _make_vpls(tracer: Tracer, origins: Array, directions: Array, carried: Array) -> Vpls:
     """Trace rays with powers `carried` (n, 3). Returns the VPLs that they make."""
     hits = tracer.closest(origins, directions)
-    emission = carried * hits.albedo * cosine_ratio(hits.normal, hits.shading_normal, directions)[:, None]
+    ratio = cosine_ratio(hits.normal, hits.shading_normal, directions)
+    emission = carried * hits.reflect_diffusely(directions) * ratio[:, None]
     alive = np.flatnonzero(hits.hit & (emission > 0).any(axis=1))
     return Vpls(hits.position[alive], hits.normal[alive], emission[alive], alive)

@@ -99,7 +99,7 @@ class _Rays:
         leaving = np.einsum("ij,ij->i", way, at.normal) / np.sqrt(np.maximum(square, np.finfo(float).tiny))
         found, carried = rays, np.zeros((len(rays), 3))
         row: Ints = np.arange(len(rays))
-        throughput: Array = at.albedo * self.limits.missing(square, leaving)[:, None]
+        throughput: Array = at.reflect_diffusely(directions[rays]) * self.limits.missing(square, leaving)[:, None]
         for bounce in range(self.bounces):
             if bounce:
                 row, throughput, at = self._carry_on(row, throughput, at, rng)
@@ -111,7 +111,7 @@ class _Rays:
         directions, above = _sample_directions(at.shading_normal.copy(), at.normal, rng.random((len(row), 2)))
         start = self.tracer.lift(at.position, at.normal)
         hit, landed = self.tracer.within(start, directions, np.where(above, np.inf, NOWHERE))
-        return row[hit], throughput[hit] * landed.albedo, landed
+        return row[hit], throughput[hit] * landed.reflect_diffusely(directions[hit]), landed
 
 
 def _sample_directions(shading_normals: Array, normals: Array, points: Array) -> tuple[Array, Bools]:

@@ -198,7 +198,7 @@ class IncrementalVpls:
         hits = tracer.closest(self._origins(light)[slots], directions)
         self.used[slots], self.landed[slots] = True, hits.hit
         self._group[slots] = np.where(hits.hit, tracer.scene.geometry.groups[hits.face], 0)
-        self.position[slots], self.albedo[slots] = hits.position, hits.albedo
+        self.position[slots], self.albedo[slots] = hits.position, hits.reflect_diffusely(directions)
         self.normal[slots], self.shading_normal[slots] = hits.normal, hits.shading_normal
         self.version[slots] = new_versions(len(slots))
 

@@ -1,5 +1,6 @@
 """References against closed forms and against each other."""
 
+import ast
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -248,15 +249,18 @@ def test_a_dark_light_gives_a_black_image():
 
 def test_the_path_tracer_shares_nothing_with_what_it_judges():
     shared = ("base.arrays", "base.colour", "base.parallel", "base.progress", "rays.tracer", "scene.scene")
-    ours = ("truth.path_tracer", "truth.lighting", "truth.emitters.")
+    data = {"scene.surfaces.brdf": {"Gloss"}, "scene.surfaces.materials": {"Texture", "TextureRef", "Wrap"}}
+    inner = ("truth.lighting", "truth.reflection", "truth.textures", "truth.emitters")
     for name in MODULES:
-        if name.startswith(tuple(f"deferred_ir.{own}" for own in ours)):
-            reached = {other for other in imports(name) if other.startswith("deferred_ir.")}
-            rest = {other for other in reached if not other.startswith("deferred_ir.truth.")}
-            assert rest <= {f"deferred_ir.{other}" for other in shared}
-            assert {other for other in reached - rest if not other.startswith("deferred_ir.truth.emitters")} <= {
-                "deferred_ir.truth.lighting"
-            }
+        if name.startswith(tuple(f"deferred_ir.{own}" for own in ("truth.path_tracer", *inner))):
+            for other in (
+                other.removeprefix("deferred_ir.") for other in imports(name) if other.startswith("deferred_ir.")
+            ):
+                assert other in shared or other in data or other.startswith(inner)
+            for node in ast.walk(ast.parse(MODULES[name].read_text())):
+                if isinstance(node, ast.ImportFrom) and (node.module or "").removeprefix("deferred_ir.") in data:
+                    names = data[node.module.removeprefix("deferred_ir.")]
+                    assert {alias.name for alias in node.names} <= names
 
 
 def test_defaults_of_vpls_are_those_of_a_render():

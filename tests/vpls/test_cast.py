@@ -14,8 +14,9 @@ from small_scenes import box, build, plane, room, scaled, sphere, textured
 from deferred_ir.base.colour import linear_from_srgb
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.sampling.patterns import PATTERNS, resample_systematically
-from deferred_ir.sampling.warps import square_to_disc
+from deferred_ir.sampling.warps import lift_to_hemisphere, square_to_disc
 from deferred_ir.scene.lights.spotlight import Spotlight
+from deferred_ir.scene.surfaces import brdf
 from deferred_ir.vpls import cast as vpls
 from deferred_ir.vpls.cast import cast
 
@@ -157,6 +158,24 @@ def test_a_vpl_has_the_albedo_of_the_texel_where_its_ray_lands():
     brightness = lights.emission / LIGHT.emission
     np.testing.assert_allclose(brightness[:, 1] / brightness[:, :2].sum(axis=1), share, atol=1e-5)
     np.testing.assert_array_equal(brightness[:, 2], 0)
+
+
+def test_vpls_carry_what_glossy_surfaces_reflect_diffusely():
+    """Their power is the integral of the diffuse part of the BRDF over all directions, for light at any angle."""
+    coat = {"specular": 0.9, "specular_color": (1.0, 2.0, 3.0), "ior": 2.0, "metallic": 0.3}
+    scene = replace(CLOSED, materials=(replace(CLOSED.materials[0], **coat),))
+    tracer = Tracer(scene)
+    origins, directions, carried = vpls._start_rays([LIGHT], scene.bounds, 1024, "sobol", 0)
+    hits, rng = tracer.closest(origins, directions), np.random.default_rng(1)
+    assert hits.gloss is not None
+    expected = np.zeros(3)
+    for points in rng.random((256, len(directions), 2)):
+        leaving = lift_to_hemisphere(square_to_disc(points), hits.normal)
+        kept, _ = brdf.eval(hits.gloss, hits.normal, leaving, -directions)
+        expected += (carried * hits.albedo * kept[:, None]).sum(axis=0) / 256
+    emission = cast([LIGHT], tracer, 1024, "sobol").emission.sum(axis=0)
+    np.testing.assert_allclose(emission, expected, rtol=1e-3)
+    assert (emission < 0.95 * 0.7 * cast([LIGHT], Tracer(CLOSED), 1024, "sobol").emission.sum(axis=0)).all()
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])

@@ -26,19 +26,26 @@ class Arriving:
     to: unit directions towards it, (n, 3). ends: where shadow rays end, (n, 3). strength and over: on a plane that
     faces it, without shadows, irradiance is emission * strength / over. strength: (n,) or (n, 3). What has an area has
     radiance as strength, over the density of the directions over solid angle, (n,); points, the squared distance.
+    own_density: that of the directions of what has an area, where `over` is something else.
     """
 
     to: Array
     ends: Array
     strength: Array
     over: Array
+    own_density: Array | None = None
+
+    @property
+    def density(self) -> Array:
+        """Density of the directions over solid angle, (n,), of what has an area."""
+        return self.over if self.own_density is None else self.own_density
 
 
 class Emitter(Protocol):
     """Anything that shines.
 
-    can_be_met: whether rays of bounces may meet it, so that both ways of sampling share its light. is_seen: whether the
-    camera sees it.
+    can_be_met: whether rays of bounces may meet it, so that both ways of sampling share its light; rays by glossy parts
+    meet all that spreads. is_seen: whether the camera sees it.
     """
 
     can_be_met: ClassVar[bool]
@@ -62,7 +69,7 @@ class Emitter(Protocol):
     def meet(self, origins: Array, directions: Array, found: Hits) -> tuple[Array, Array]:
         """Return the radiance over emission along rays that hit `found`, (n,) or (n, 3), and the density of `sample`.
 
-        directions: unit, (n, 3). Asked only of emitters that can be met.
+        directions: unit, (n, 3). Asked only of emitters that spread.
         """
 
 
@@ -87,11 +94,6 @@ class Twin:
     around: Surroundings
     can_be_met: ClassVar[bool] = False
     is_seen: ClassVar[bool] = False
-
-    def meet(self, origins: Array, directions: Array, found: Hits) -> tuple[Array, Array]:
-        """Return nothing: no ray meets it."""
-        del directions, found
-        return np.zeros(len(origins)), np.zeros(len(origins))
 
 
 def dot(a: Array, b: Array) -> Array:

@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from deferred_ir.base.arrays import Array
+from deferred_ir.rays.tracer import Hits
 from deferred_ir.truth.emitters.base import LUMINANCE, Arriving, Twin, aim
-from deferred_ir.truth.emitters.sphere import sample_ball
+from deferred_ir.truth.emitters.sphere import meet_ball, sample_ball
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,12 @@ class PointTwin(Twin):
             return Arriving(to, source, np.ones(len(at)), square)
         found = sample_ball(centre, radius, at, points)
         return Arriving(found.to, found.ends, found.strength / (np.pi * radius**2), found.over)
+
+    def meet(self, origins: Array, directions: Array, found: Hits) -> tuple[Array, Array]:
+        """Return the radiance over intensity of rays that enter the ball ahead of the surface that they hit."""
+        centre, radius = np.asarray(self.light.position, float), self.light.radius
+        shining, density = meet_ball(centre, radius, origins, directions, found)
+        return shining / (np.pi * radius**2), density
 
 
 TWIN = PointTwin

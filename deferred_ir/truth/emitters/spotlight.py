@@ -8,7 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from deferred_ir.base.arrays import Array
+from deferred_ir.rays.tracer import Hits
 from deferred_ir.truth.emitters.base import LUMINANCE, Arriving, Twin, aim, dot, find_axes
+
+LEAST = 1e-12
+"""Keeps divisors off 0 where the disc is seen edge-on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,10 +46,36 @@ class SpotlightTwin(Twin):
         angle, radius = 2 * np.pi * points[:, 1:], light.radius * np.sqrt(points[:, :1])
         source = np.asarray(light.position) + radius * (np.cos(angle) * right + np.sin(angle) * up)
         to, square = aim(source, at)
+        leaving = np.maximum(-(to @ axis), 0)
+        arriving = leaving * self._find_cone(to)
+        if not self.spreads:
+            return Arriving(to, source, arriving, square)
+        return Arriving(to, source, arriving, square, square / (self._area * np.maximum(leaving, LEAST)))
+
+    def meet(self, origins: Array, directions: Array, found: Hits) -> tuple[Array, Array]:
+        """Return the radiance over E of rays that cross its disc ahead of the surface that they hit."""
+        axis, right, up = self._axes
+        leaving = -(directions @ axis)
+        off = origins - np.asarray(self.light.position, float)
+        reach = (off @ axis) / np.where(leaving > 0, leaving, 1)
+        place = off + reach[:, None] * directions
+        across, way = place @ np.stack([right, up], axis=1), found.position - origins
+        free = ~found.hit | (reach**2 < dot(way, way))
+        met = (leaving > 0) & (reach > 0) & free & (dot(across, across) <= self.light.radius**2)
+        radiance = met * self._find_cone(directions) / self._area
+        return radiance, reach**2 / (self._area * np.maximum(leaving, LEAST))
+
+    @property
+    def _area(self) -> float:
+        return float(np.pi * self.light.radius**2)
+
+    def _find_cone(self, to: Array) -> Array:
+        """Return the fraction that the cone lets through against unit `to` (n, 3), (n,)."""
         # 1 - cos of angle and cone by squares of half angles: differences would cancel for the narrowest cones.
-        off_axis, edge = dot(to + axis, to + axis) / 2, 2 * np.sin(np.radians(light.fov) / 4) ** 2
-        cone = np.clip(4 * (edge - off_axis) / edge, 0, 1)
-        return Arriving(to, source, np.maximum(-(to @ axis), 0) * cone, square)
+        off = to + self._axes[0]
+        off_axis, edge = dot(off, off) / 2, 2 * np.sin(np.radians(self.light.fov) / 4) ** 2
+        cone: Array = np.clip(4 * (edge - off_axis) / edge, 0, 1)
+        return cone
 
 
 TWIN = SpotlightTwin

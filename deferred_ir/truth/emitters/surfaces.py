@@ -1,4 +1,4 @@
-"""Emitting triangles, textures of emission included, all as one emitter.
+"""Emitting triangles, textures of emission and holes included, all as one emitter.
 
 A triangle is drawn in proportion to its area and the brightness of its texture at a few points, then a place on it.
 """
@@ -12,10 +12,10 @@ from typing import ClassVar
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.base.colour import srgb_table
 from deferred_ir.rays.tracer import Hits
 from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.emitters.base import LUMINANCE, TINY, Arriving, aim, dot
+from deferred_ir.truth.textures import look_up
 
 STEPS = 8
 """Probes of a texture along a triangle's edge."""
@@ -25,9 +25,13 @@ LEAST = 0.1
 
 @dataclass(frozen=True, eq=False)
 class EmittingSurfaces:
-    """The triangles of `scene` whose material emits."""
+    """The triangles of `scene` whose material emits: those that light others, or those that are only seen.
+
+    unlit: whether they are the latter, which have no power and are never sampled.
+    """
 
     scene: Scene
+    unlit: bool = False
     can_be_met: ClassVar[bool] = True
     is_seen: ClassVar[bool] = True
 
@@ -43,8 +47,9 @@ class EmittingSurfaces:
 
     @cached_property
     def _emits(self) -> Bools:
-        """Whether each material emits."""
-        return np.array([any(material.emission) for material in self.scene.materials], bool)
+        """Whether each material is of those that emit."""
+        materials = self.scene.materials
+        return np.array([any(material.emission) and material.unlit == self.unlit for material in materials], bool)
 
     @cached_property
     def _both(self) -> Bools:
@@ -57,6 +62,11 @@ class EmittingSurfaces:
         geometry = self.scene.geometry
         faces: Ints = np.flatnonzero(self._emits[geometry.face_materials] & (geometry.face_areas > 0))
         return faces
+
+    @property
+    def are_there(self) -> bool:
+        """Whether there are any."""
+        return len(self._faces) > 0
 
     @cached_property
     def _powers(self) -> Array:
@@ -86,6 +96,8 @@ class EmittingSurfaces:
     def _density(self) -> Array:
         """The density by area with which places of each of the scene's triangles are drawn, (F,)."""
         density = np.zeros(len(self.scene.geometry.faces))
+        if self.unlit:
+            return density
         density[self._faces] = self._powers / self.power / self.scene.geometry.face_areas[self._faces]
         return density
 
@@ -134,11 +146,17 @@ class EmittingSurfaces:
         numbers = geometry.face_materials[faces]
         radiance = np.array([material.emission for material in materials], float)[numbers]
         for number in np.unique(numbers):
-            image = materials[number].emission_texture
-            if image is not None and geometry.uvs is not None:
-                rows = np.flatnonzero(numbers == number)
-                uvs = np.einsum("ni,nij->nj", weights[rows], geometry.uvs[geometry.faces[faces[rows]]].astype(float))
-                radiance[rows] *= _look_up_texture(self.scene.textures[image.number].pixels, uvs)
+            rows = np.flatnonzero(numbers == number)
+            material = materials[number]
+            if material.emission_texture is not None:
+                glow = look_up(self.scene, material.emission_texture, faces[rows], weights[rows])
+                radiance[rows] *= 1 if glow is None else glow[:, :3]
+            if material.alpha_cutoff is not None:
+                alpha = np.full(len(rows), material.alpha)
+                if material.base_color_texture is not None:
+                    base = look_up(self.scene, material.base_color_texture, faces[rows], weights[rows])
+                    alpha *= 1 if base is None else base[:, 3]
+                radiance[rows[alpha < material.alpha_cutoff]] = 0
         return radiance
 
 
@@ -150,15 +168,3 @@ def _find_weights(positions: Array, corners: Array) -> Array:
     second = dot(np.cross(positions - a, c - a), whole) / square
     third = dot(np.cross(b - a, positions - a), whole) / square
     return np.stack([1 - second - third, second, third], axis=1)
-
-
-def _look_up_texture(pixels: Array, uvs: Array) -> Array:
-    """Return linear RGB (n, 3) at uvs (n, 2), bilinear and repeating, of 8-bit sRGB pixels whose top edge is v = 1."""
-    height, width = pixels.shape[:2]
-    x, y = uvs[:, 0] * width - 0.5, (1 - uvs[:, 1]) * height - 0.5
-    left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    found = np.zeros((len(uvs), 3))
-    for i, across in ((0, 1 - (x - left)), (1, x - left)):
-        for j, down in ((0, 1 - (y - top)), (1, y - top)):
-            found += srgb_table()[pixels[(top + j) % height, (left + i) % width]] * (across * down)[:, None]
-    return found

@@ -18,6 +18,8 @@ from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
+from deferred_ir.pool.reflections import ALIKE
+from deferred_ir.pool.samples import read_layout
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,8 @@ class FilterReflections(Pass):
     Params = Params
     inputs: ClassVar[Mapping[str, Input]] = {
         "reflections": Input("reflected radiance over the share that is reflected, distance", format="rgba32f"),
+        "layout": Input("where samples stand that traced for pixels around them", format="layout", optional=True),
+        "blend": Input("what a pixel takes of which samples", format="r32ui", optional=True),
         "depth": Input("reversed depth", format="depth32f"),
         "normals": Input("shading and geometric normal", format="rgba16"),
         "material": Input("roughness, metallic and material", format="rgba16", optional=True),
@@ -71,7 +75,9 @@ class FilterReflections(Pass):
         steps, unit = self.params.steps, int(io.defines["UNIT_REFLECTIONS"])
         draws = max(steps, 1)  # without steps the pixels are copied
         targets = [io["filtered"], io["scratch"]]
-        program = io.program("filter_reflections.frag", defines={"SMOOTH": int(frame.smooth)})
+        program = io.program("filter_reflections.frag", defines={"SMOOTH": int(frame.smooth), "ALIKE": ALIKE})
+        if io["layout"]:
+            program.set(offset=read_layout(io).offset)
         for step in range(draws):
             target = targets[(draws - 1 - step) % 2]
             program.set(

@@ -22,7 +22,8 @@ from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.pool.effort import accept_effort, read_effort
-from deferred_ir.pool.reflections import GlossyPixels, Reflections
+from deferred_ir.pool.reflections import GlossyPixels, Reflections, choose_traced
+from deferred_ir.pool.samples import read_layout
 from deferred_ir.pool.vpl_choice import VplChoice
 from deferred_ir.scene.scene import Scene
 from deferred_ir.scene.surfaces.brdf import make_gloss
@@ -48,13 +49,18 @@ class ReflectionRays(Pass):
         "albedo": Input("base colour", format="rgba16f"),
         "material": Input("roughness, metallic and material", format="rgba16", optional=True),
         "vpls": Input("the VPLs, of which each hit asks one", format="vpl"),
+        "layout": Input("where samples stand that trace for pixels around them", format="layout", optional=True),
+        "blend": Input("what a pixel takes of which samples", format="r32ui", optional=True),
         "effort": accept_effort("factor on `rays`"),
     }
 
     def outputs(self, inputs: Mapping[str, Description | None]) -> Mapping[str, Output]:
         """Return one texture of the frame's size."""
         del inputs
-        doc = "reflected radiance over the share that is reflected; alpha: distance to what it shows, 0 without gloss"
+        doc = (
+            "reflected radiance over the share that is reflected; alpha: distance to what it shows, 0 without gloss, "
+            "below 0 where samples stand for it"
+        )
         return {"reflections": Output(doc, Texture("rgba32f"), attach=False, transient=True)}
 
     def unneeded(self, facts: Facts) -> str | None:
@@ -80,6 +86,12 @@ class ReflectionRays(Pass):
         color, code = (io[port].read().reshape(-1, 4)[seen.pixel] for port in ("albedo", "material"))
         numbers = np.round(code[:, 2:] * 65535).astype(int) @ [1, 65536]
         glossy = np.flatnonzero(_list_glossy(frame.scene)[numbers])
+        if io["layout"]:
+            roughness = np.full(height * width, -1, np.float32)
+            roughness[seen.pixel[glossy]] = code[glossy, 0]
+            traced = choose_traced(read_layout(io), io["blend"].read().reshape(-1), roughness)
+            image[:, 3] = np.where((roughness >= 0) & ~traced, -1, 0)
+            glossy = glossy[traced[seen.pixel[glossy]]]
         seen, color, code = seen.rows(glossy), color[glossy].astype(np.float64), code[glossy].astype(np.float64)
         _, gloss = make_gloss(frame.scene.materials, numbers[glossy], color[:, :3], code[:, 1], code[:, 0])
         to_viewer = np.asarray(frame.scene.camera.position) - seen.position

@@ -32,9 +32,8 @@ MOST_REFLECTIONS = 4
 WIDE, ALIKE = 0.1, 0.1
 """Of lobes wider than this, roughness 0.32, a sample's reflections stand for pixels around it whose roughness differs
 by no more than the second."""
-NARROW, TIMES = 0.03, 4
-"""In a lobe narrower than this, roughness 0.17, the filter that follows finds little to average: where rays of such a
-lobe first hit, light is drawn so many times."""
+TIMES = 4
+"""Where rays of narrower lobes first hit, light is drawn so many times: the filter that follows finds little to average."""
 LEAST_SHARE = 0.02
 """Reflectances below this are taken as this where light is carried over its reflectance."""
 
@@ -148,18 +147,19 @@ class Reflections:
         position = each.seen.position.astype(np.float64)
         surface = _Surface(position, each.seen.normal, normal, each.gloss, each.to_viewer)
         above, rays = _draw_rays(self.tracer, surface, points.reshape(-1, 2))
-        shown, inverse = self._follow(rays, each.gloss.alpha[above] < NARROW, rng)
+        shown, inverse = self._follow(rays, each.gloss.alpha[above], rng)
         radiance[above] += shown
         radiance /= share_reflectance(each.gloss, normal, each.to_viewer)
         distances = np.zeros(len(radiance))
         distances[above] = inverse
         return radiance.reshape(own, count, 3).mean(axis=1), distances.reshape(own, count).mean(axis=1)
 
-    def _follow(self, rays: _Rays, narrow: Bools, rng: np.random.Generator) -> tuple[Array, Array]:
+    def _follow(self, rays: _Rays, widest: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Return what rays (n) show, times their weights, (n, 3), and 1 over the distance of their first hits, (n,).
 
-        narrow: whether the lobes that they come from are.
+        widest: widths of the lobes that they come from.
         """
+        narrow = widest <= WIDE
         shown, inverse = np.zeros(rays.starts.shape), np.zeros(len(rays.starts))
         rows = np.arange(len(shown))
         for number in range(MOST_REFLECTIONS):
@@ -172,8 +172,11 @@ class Reflections:
             if not len(hit):
                 break
             rows, at, weights, viewer = rows[hit], found.rows(hit), rays.weights[hit], -rays.ways[hit]
-            gloss = at.gloss
-            assert gloss is not None
+            assert at.gloss is not None
+            # What a wide lobe shows is blurred anyway; the highlights of narrow ones in it would be rare, bright dots
+            # (Kaplanyan and Dachsbacher 2013, section 4).
+            widest = np.maximum(at.gloss.alpha, widest[hit])
+            gloss = replace(at.gloss, alpha=widest)
             times = np.where(narrow[rows] & (number == 0), TIMES, 1)
             shown[rows] += weights * self._shade(at, gloss, viewer, times, rng)
             surface = _Surface(at.position, at.normal, at.shading_normal, gloss, viewer)
@@ -182,7 +185,7 @@ class Reflections:
             stay = np.flatnonzero(rng.random(len(on)) < chance)
             rays = ahead.rows(stay)
             rays = replace(rays, weights=rays.weights * weights[on[stay]] / chance[stay, None])
-            rows = rows[on[stay]]
+            rows, widest = rows[on[stay]], widest[on[stay]]
         return shown, inverse
 
     def _shade(self, at: Hits, gloss: Gloss, to_viewer: Array, times: Ints, rng: np.random.Generator) -> Array:

@@ -32,6 +32,15 @@ class Part:
     second_uvs: Array | None = None
     tangents: Array | None = None
 
+    def pick(self, vertices: Ints, faces: Ints) -> Part:
+        """Return the part with `vertices` (n,) of its own in place of all, and `faces` (m, 3), which use these."""
+        arrays = ("positions", "normals", "uvs", "colors", "second_uvs", "tangents")
+        picked: dict[str, Any] = {}
+        for name in arrays:
+            rows = getattr(self, name)
+            picked[name] = None if rows is None else rows[vertices]
+        return replace(self, faces=faces, **picked)
+
 
 @dataclass(frozen=True, eq=False)
 class ModelData:

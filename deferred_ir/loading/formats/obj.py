@@ -6,7 +6,6 @@ skips missing materials and images without a word, and rounds Kd to 8 bits.
 
 from __future__ import annotations
 
-import io
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from deferred_ir.base.errors import SceneError
 from deferred_ir.loading.asset_paths import Assets, strip_options
 from deferred_ir.loading.formats.model_format import FileImage, FileMaterial, ModelFormat, choose_plain_albedo
 from deferred_ir.loading.model_data import check_albedo, check_emission
+from deferred_ir.loading.textures import open_image
 from deferred_ir.scene.surfaces.materials import WHITE, Material
 
 MATERIALS = "materials.mtl"
@@ -78,13 +78,9 @@ class ObjFormat(ModelFormat):
         return FileMaterial(found, images)
 
     def _open_image(self, material: Any, name: str) -> Any:
-        from PIL import Image
-
         if name not in self._images:
-            try:
-                self._images[name] = Image.open(io.BytesIO(self.assets[name]))
-            except (OSError, ValueError):  # FileNotFoundError is one, and so is what PIL does not know
-                self.require_image(material, None, name)
+            self._images[name] = open_image(self.assets[name]) if self.assets.path(name) else None
+        self.require_image(material, self._images[name], name)
         return self._images[name]
 
 

@@ -19,6 +19,7 @@ from deferred_ir.loading.formats.gltf import GltfFormat
 from deferred_ir.loading.formats.model_format import FileImage, ModelFormat
 from deferred_ir.loading.formats.obj import ObjFormat
 from deferred_ir.loading.model_data import ModelData, Part
+from deferred_ir.loading.tangents import add_tangents, place_tangents
 from deferred_ir.loading.textures import decode_texture
 from deferred_ir.scene.surfaces.materials import WHITE, Material, Texture, TextureRef
 
@@ -134,11 +135,15 @@ class _Reader:
         if normals is not None:
             normals = _transform_normals(normals, linear)
         part = Part(positions, faces, material, normals, uvs, second_uvs=second_uvs)
+        if material.normal_texture is not None and normals is not None:
+            tangents = self.format.read_tangents(mesh)
+            part = part if tangents is None else replace(part, tangents=place_tangents(tangents, normals, linear))
         if colors is not None and len(colors) == len(faces) and len(colors) != len(vertices):
             # Colours per face: give each face vertices of its own.
-            corners = np.arange(faces.size).reshape(-1, 3)
-            return replace(part.pick(faces.ravel(), corners), colors=np.repeat(colors, 3, axis=0))
-        return replace(part, colors=colors)
+            part = part.pick(faces.ravel(), np.arange(faces.size).reshape(-1, 3))
+            colors = np.repeat(colors, 3, axis=0)
+        part = replace(part, colors=colors)
+        return add_tangents(part) if material.normal_texture is not None and part.tangents is None else part
 
     def _check_positions(self, positions: Array) -> None:
         bad = int((~np.isfinite(positions).all(axis=1)).sum())

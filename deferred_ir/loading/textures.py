@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -59,6 +60,23 @@ def decode_texture(image: Any, name: str, *, alpha: bool = False) -> Texture:
         raise SceneError(f"{name}: not a readable image ({' '.join(str(error).split())}); replace the file") from error
     has_alpha = "A" in image.getbands() or "transparency" in image.info
     return Texture(name, np.ascontiguousarray(pixels[:, :, : 4 if alpha and has_alpha else 3]))
+
+
+def join_greys(textures: Sequence[Texture | None]) -> Any:
+    """Return a PIL image of 8 bits whose red, green and blue are the first channels of three textures; white for None.
+
+    They are scaled to the largest.
+    """
+    from PIL import Image
+
+    given = [texture.pixels.shape[:2] for texture in textures if texture is not None]
+    size = max(width for _, width in given), max(height for height, _ in given)
+    bands = []
+    for texture in textures:
+        plane = np.full(size[::-1], 255, np.uint8) if texture is None else texture.pixels[:, :, 0]
+        grey = Image.fromarray((plane // 257).astype(np.uint8) if plane.dtype == np.uint16 else plane)
+        bands.append(grey if grey.size == size else grey.resize(size, Image.Resampling.BILINEAR))
+    return Image.merge("RGB", bands)
 
 
 def _read_pixels(image: Any) -> Any:

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from deferred_ir.base.arrays import Vec3
-from deferred_ir.base.errors import SceneError, format_value
-from deferred_ir.loading.model_data import check_albedo, check_emission
+from deferred_ir.loading.model_data import check_albedo, check_emission, check_factor
 from deferred_ir.scene.surfaces.materials import (
     BLACK,
     IDENTITY,
@@ -122,15 +121,7 @@ class MaterialReader:
     def _read_number(
         self, table: Json, key: str, default: float, where: str, *, least: float = 0.0, most: float = math.inf
     ) -> float:
-        """Return a number; one above `most` is cut to it, with a note."""
-        value = table.get(key, default)
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not number or not math.isfinite(value) or value < least:
-            bound = "" if least == -math.inf else f" of {least:g} or more"
-            raise SceneError(f"{where}: {key} {format_value(value)} must be a finite number{bound}; mend the file")
-        if value > most:
-            self.notes.append(f"{where}: {key} above {most:g} is cut to {most:g}")
-        return min(float(value), most)
+        return check_factor(table.get(key, default), key, where, self.notes, least=least, most=most)
 
     def _find_images(self, infos: dict[str, Json | None]) -> dict[str, ImageUse]:
         return {slot: self._find_image(info) for slot, info in infos.items() if info is not None}

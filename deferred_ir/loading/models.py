@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,11 +33,18 @@ FAR_UVS = 16.0
 """A mesh whose texture coordinates centre on a point farther out than this has them moved towards 0."""
 
 
-def read(path: Path, scale: float = 1.0, translate: Vec3 = (0.0, 0.0, 0.0), root: Path | None = None) -> ModelData:
+def read(
+    path: Path,
+    scale: float = 1.0,
+    translate: Vec3 = (0.0, 0.0, 0.0),
+    root: Path | None = None,
+    covering: Collection[str] = (),
+) -> ModelData:
     """Read a model file and place it: the file's own transforms, then `scale`, then `translate`.
 
-    Files that it names are read only from its own folder and from `root`. Raises SceneError, one line with the file's
-    name, where it is missing, broken, without triangles, or has vertices that are no numbers.
+    covering: names of materials whose images keep their alpha, whatever the file asks for. Files that it names are read
+    only from its own folder and from `root`. Raises SceneError, one line with the file's name, where it is missing,
+    broken, without triangles, or has vertices that are no numbers.
     """
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):
@@ -48,7 +55,7 @@ def read(path: Path, scale: float = 1.0, translate: Vec3 = (0.0, 0.0, 0.0), root
         raise SceneError(f"{path}: cannot be read: {what}; check the model's path") from error
     try:
         with np.errstate(all="ignore"):  # numbers that overflow on the way are found among the vertices
-            return _Reader(_open_format(path, data, root)).read(scale, translate)
+            return _Reader(_open_format(path, data, root), covering).read(scale, translate)
     except MemoryError as error:
         raise SceneError(f"{path}: takes more memory than there is; give a smaller model") from error
 
@@ -66,7 +73,8 @@ def _open_format(path: Path, data: bytes, root: Path | None) -> ModelFormat:
 class _Reader:
     """Reads the meshes of one file and places them in the world."""
 
-    def __init__(self, format: ModelFormat) -> None:
+    def __init__(self, format: ModelFormat, covering: Collection[str]) -> None:
+        self.covering = covering
         self.format, self.path, self.notes = format, format.path, format.notes
         self.textures: list[Texture] = []
         self.images: dict[tuple[int, bool], tuple[int, Any]] = {}
@@ -174,7 +182,8 @@ class _Reader:
         """Return a mesh's material; its textures are those read so far."""
         material, images = self.format.read_material(getattr(mesh.visual, "material", None), colored=colored)
         found: dict[str, TextureRef | None] = {}
-        covering = images["base_color"].image if material.is_cut and "base_color" in images else None
+        covers = (material.is_cut or material.name in self.covering) and "base_color" in images
+        covering = images["base_color"].image if covers else None
         for slot, image in images.items():
             if image.use.uv_set < len(uv_sets) and uv_sets[image.use.uv_set] is not None:
                 found[slot] = replace(image.use, number=self._read_texture(image, alpha=image.image is covering))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gltf_documents import UVS, Document, image_uri, load, load_material, png
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from deferred_ir.base.errors import SceneError
@@ -263,3 +263,66 @@ def test_images_in_buffers(tmp_path: Path) -> None:
     document.json["images"] = [{"bufferView": view, "mimeType": "image/png"}]
     document.triangle({"material": 0}, TEXCOORD_0=document.accessor(UVS))
     assert load(document.write(tmp_path / "m.glb")).textures[0].pixels[0, 0].tolist() == [255, 0, 0]
+
+
+def rich_document() -> dict[str, Any]:
+    """Tables that use every key of materials, with one triangle."""
+    transform = {"offset": [0, 1], "scale": [2, 2], "rotation": 1.0, "texCoord": 0}
+    info = {"index": 0, "texCoord": 1, "extensions": {"KHR_texture_transform": transform}}
+    base = {"baseColorFactor": [1, 1, 1, 1], "baseColorTexture": info, "metallicFactor": 0.5, "roughnessFactor": 0.5}
+    coat = {"specularFactor": 0.5, "specularColorFactor": [1, 1, 1]}
+    material = {
+        "pbrMetallicRoughness": base | {"metallicRoughnessTexture": {"index": 0}},
+        "normalTexture": {"index": 0, "scale": 2},
+        "emissiveFactor": [1, 1, 1],
+        "emissiveTexture": {"index": 0},
+        "alphaMode": "MASK",
+        "alphaCutoff": 0.3,
+        "doubleSided": True,
+        "name": "rich",
+        "extensions": {
+            "KHR_materials_ior": {"ior": 1.4},
+            "KHR_materials_specular": coat,
+            "KHR_materials_emissive_strength": {"emissiveStrength": 3},
+        },
+    }
+    unlit = {"pbrMetallicRoughness": base, "alphaMode": "BLEND", "extensions": {"KHR_materials_unlit": {}}}
+    return {
+        "materials": [material, unlit],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{"wrapS": 33648, "magFilter": 9729, "minFilter": 9987}],
+        "images": [{"uri": png((1, 2, 3))}],
+    }
+
+
+def list_places(value: Any, before: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Return the keys and indices that lead to each value within tables and arrays."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [place for key, item in inner for place in ((*before, key), *list_places(item, (*before, key)))]
+
+
+@settings(deadline=None, max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    place=st.sampled_from(list_places(rich_document())),
+    value=st.sampled_from([None, -1, 7, 1e308, 10**30, math.nan, "a", "data:,", True, [], [1], [[1]], {}]),
+)
+def test_a_wrong_value_gives_a_scene_or_one_line(tmp_path: Path, place: tuple[Any, ...], value: Any) -> None:
+    tables = rich_document()
+    inner: Any = tables
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = value
+    document = Document(**tables)
+    for index in (0, 1):
+        document.triangle(
+            {"material": index},
+            **{f"TEXCOORD_{number}": document.accessor(UVS) for number in (0, 1)},
+            NORMAL=document.accessor(np.tile(np.array([0, 0, 1], np.float32), (3, 1))),
+            TANGENT=document.accessor(np.ones((3, 4), np.float32)),
+            COLOR_0=document.accessor(np.full((3, 4), 0.5, np.float32)),
+        )
+    try:
+        message = f"{len(load(document.write(tmp_path / 'm.gltf')).geometry.faces)} faces"
+    except SceneError as error:
+        message = str(error)
+    assert len(message.splitlines()) == 1

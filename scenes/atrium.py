@@ -30,6 +30,7 @@ COLORS = {
     "blue": (20, 41, 158),
 }
 """Linear reflectance in 255ths: the GLB writer goes through 8 bits, which keeps these exact."""
+SPECULAR = "KHR_materials_specular"
 
 BAY = 2.4
 COURT = (3.6, 9.6)
@@ -253,7 +254,14 @@ def write(path: Path) -> None:
         visual = library.visual.TextureVisuals(material=material)
         part = library.Trimesh(positions, faces, vertex_normals=normals, visual=visual, process=False)
         scene.add_geometry(part, node_name=name, geom_name=name)
-    path.write_bytes(library.exchange.gltf.export_glb(scene, include_normals=True))
+    path.write_bytes(library.exchange.gltf.export_glb(scene, include_normals=True, tree_postprocessor=make_matt))
+
+
+def make_matt(document: dict[str, Any]) -> None:
+    """Say in a glTF document that its materials have no gloss: in glTF, what is no metal is plastic."""
+    for material in document["materials"]:
+        material["extensions"] = {SPECULAR: {"specularFactor": 0.0}}
+    document["extensionsUsed"] = [SPECULAR]
 
 
 if __name__ == "__main__":

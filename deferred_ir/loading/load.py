@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
 from deferred_ir.base.errors import SceneError, did_you_mean
+from deferred_ir.base.toml_tables import Faults
 from deferred_ir.loading import default_views, merge, models, scene_file
-from deferred_ir.loading.model_data import ModelData, darken
+from deferred_ir.loading.material_tables import MaterialOverride, check_names
+from deferred_ir.loading.model_data import ModelData, Part, darken
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.scene import Scene
@@ -30,10 +34,8 @@ def load(scene: str | os.PathLike[str]) -> Scene:
     path = _find_file(os.fspath(scene))
     is_scene_file = path.suffix.lower() == ".toml"
     described = scene_file.read(path) if is_scene_file else SceneFile(path.stem, (ModelEntry(path),))
-    read = [
-        (_read_model(entry, path, index, len(described.models)), entry.motion)
-        for index, entry in enumerate(described.models)
-    ]
+    read = [(_read_model(entry, path, index, described), entry.motion) for index, entry in enumerate(described.models)]
+    _check_names(described, (model for model, _ in read), path)
     geometry, materials, textures, ranges = merge.merge(read, str(path))
     notes = tuple(dict.fromkeys(note for model, _ in read for note in model.notes))
     result = Scene(
@@ -52,16 +54,33 @@ def load(scene: str | os.PathLike[str]) -> Scene:
     return default_views.choose_views(result, camera=described.camera is None, spotlight=dark)
 
 
-def _read_model(entry: ModelEntry, path: Path, index: int, count: int) -> ModelData:
+def _read_model(entry: ModelEntry, path: Path, index: int, described: SceneFile) -> ModelData:
     """Read the model of an entry; an error says which entry of which scene file names it."""
+    overrides = described.materials
+    covering = [name for name, override in overrides.items() if override.alpha_cutoff is not None]
     try:
-        read = models.read(entry.path, entry.scale, entry.translate, root=path.parent)
+        read = models.read(entry.path, entry.scale, entry.translate, root=path.parent, covering=covering)
+        read = replace(read, parts=tuple(_override(part, read, overrides) for part in read.parts))
         return read if entry.lights else darken(read)
     except SceneError as error:
         if entry.path == path:
             raise
-        key = "model.path" if count == 1 else f"model[{index}].path"
+        key = "model.path" if len(described.models) == 1 else f"model[{index}].path"
         raise SceneError(f"{path}: {key}: {error}") from error
+
+
+def _override(part: Part, model: ModelData, overrides: Mapping[str, MaterialOverride]) -> Part:
+    """Return a part with what the scene file says of its material."""
+    override = overrides.get(part.material.name)
+    return replace(part, material=override.apply(part.material, model.textures)) if override else part
+
+
+def _check_names(described: SceneFile, read: Iterable[ModelData], path: Path) -> None:
+    """Raise SceneError if the scene file names materials that no surface has."""
+    faults = Faults(str(path))
+    check_names(faults, described.materials, {part.material.name for model in read for part in model.parts})
+    if faults.found:
+        faults.fail()
 
 
 def _find_folder() -> Path:

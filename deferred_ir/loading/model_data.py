@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Ints, Vec3
-from deferred_ir.base.errors import SceneError
+from deferred_ir.base.errors import SceneError, format_value
 from deferred_ir.scene.surfaces.materials import BLACK, Material, Texture
 
 GREY = (0.8, 0.8, 0.8)
@@ -31,6 +31,15 @@ class Part:
     colors: Array | None = None
     second_uvs: Array | None = None
     tangents: Array | None = None
+
+    def pick(self, vertices: Ints, faces: Ints) -> Part:
+        """Return the part with `vertices` (n,) of its own in place of all, and `faces` (m, 3), which use these."""
+        arrays = ("positions", "normals", "uvs", "colors", "second_uvs", "tangents")
+        picked: dict[str, Any] = {}
+        for name in arrays:
+            rows = getattr(self, name)
+            picked[name] = None if rows is None else rows[vertices]
+        return replace(self, faces=faces, **picked)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +63,22 @@ def check_emission(values: Any, where: str) -> Vec3:
         raise SceneError(f"{where}: emission {numbers} must be three finite numbers of 0 or more; mend the file")
     red, green, blue = numbers
     return red, green, blue
+
+
+def check_factor(
+    value: Any, key: str, where: str, notes: list[str], *, least: float = 0.0, most: float = math.inf
+) -> float:
+    """Return a number of a file's material; one above `most` is cut to it, with a note.
+
+    Raises SceneError unless it is finite and `least` or more.
+    """
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not math.isfinite(value) or value < least:
+        bound = "" if least == -math.inf else f" of {least:g} or more"
+        raise SceneError(f"{where}: {key} {format_value(value)} must be a finite number{bound}; mend the file")
+    if value > most:
+        notes.append(f"{where}: {key} above {most:g} is cut to {most:g}")
+    return min(float(value), most)
 
 
 def darken(model: ModelData) -> ModelData:

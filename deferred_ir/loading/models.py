@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from deferred_ir.loading.formats.gltf import GltfFormat
 from deferred_ir.loading.formats.model_format import FileImage, ModelFormat
 from deferred_ir.loading.formats.obj import ObjFormat
 from deferred_ir.loading.model_data import ModelData, Part
+from deferred_ir.loading.tangents import add_tangents, place_tangents
 from deferred_ir.loading.textures import decode_texture
 from deferred_ir.scene.surfaces.materials import WHITE, Material, Texture, TextureRef
 
@@ -31,11 +33,18 @@ FAR_UVS = 16.0
 """A mesh whose texture coordinates centre on a point farther out than this has them moved towards 0."""
 
 
-def read(path: Path, scale: float = 1.0, translate: Vec3 = (0.0, 0.0, 0.0), root: Path | None = None) -> ModelData:
+def read(
+    path: Path,
+    scale: float = 1.0,
+    translate: Vec3 = (0.0, 0.0, 0.0),
+    root: Path | None = None,
+    covering: Collection[str] = (),
+) -> ModelData:
     """Read a model file and place it: the file's own transforms, then `scale`, then `translate`.
 
-    Files that it names are read only from its own folder and from `root`. Raises SceneError, one line with the file's
-    name, where it is missing, broken, without triangles, or has vertices that are no numbers.
+    covering: names of materials whose images keep their alpha, whatever the file asks for. Files that it names are read
+    only from its own folder and from `root`. Raises SceneError, one line with the file's name, where it is missing,
+    broken, without triangles, or has vertices that are no numbers.
     """
     try:
         if path.exists() and not (path.is_file() or path.is_dir()):
@@ -46,7 +55,7 @@ def read(path: Path, scale: float = 1.0, translate: Vec3 = (0.0, 0.0, 0.0), root
         raise SceneError(f"{path}: cannot be read: {what}; check the model's path") from error
     try:
         with np.errstate(all="ignore"):  # numbers that overflow on the way are found among the vertices
-            return _Reader(_open_format(path, data, root)).read(scale, translate)
+            return _Reader(_open_format(path, data, root), covering).read(scale, translate)
     except MemoryError as error:
         raise SceneError(f"{path}: takes more memory than there is; give a smaller model") from error
 
@@ -64,10 +73,11 @@ def _open_format(path: Path, data: bytes, root: Path | None) -> ModelFormat:
 class _Reader:
     """Reads the meshes of one file and places them in the world."""
 
-    def __init__(self, format: ModelFormat) -> None:
+    def __init__(self, format: ModelFormat, covering: Collection[str]) -> None:
+        self.covering = covering
         self.format, self.path, self.notes = format, format.path, format.notes
         self.textures: list[Texture] = []
-        self.images: dict[int, tuple[int, Any]] = {}
+        self.images: dict[tuple[int, bool], tuple[int, Any]] = {}
         self.texels = 0
 
     def read(self, scale: float, translate: Vec3) -> ModelData:
@@ -121,15 +131,10 @@ class _Reader:
             raise SceneError(f"{self.path}: vertices are not three numbers each; export it again")
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise SceneError(f"{self.path}: a face uses a vertex that does not exist; export it again")
-        colors, uvs = self._read_attributes(mesh, len(vertices), len(faces))
-        material = self._read_material(mesh, colored=colors is not None, has_uvs=uvs is not None)
-        uvs = uvs if any(material.textures.values()) else None
-        if colors is not None and len(colors) == len(faces) and len(colors) != len(vertices):
-            # Colours per face: give each face vertices of its own.
-            corners = faces.ravel()
-            vertices, faces = vertices[corners], np.arange(len(corners)).reshape(-1, 3)
-            normals = None if normals is None else normals[corners]
-            uvs, colors = (None if uvs is None else uvs[corners]), np.repeat(colors, 3, axis=0)
+        colors = self._read_colors(mesh, len(vertices), len(faces))
+        uv_sets = tuple(self._read_uvs(uvs, len(vertices)) for uvs in self.format.read_uvs(mesh))
+        material = self._read_material(mesh, colored=colors is not None, uv_sets=uv_sets)
+        uvs, second_uvs = (_pick_uvs(each, number, material) for number, each in enumerate(uv_sets))
         positions = vertices @ matrix[:3, :3].T + matrix[:3, 3]
         self._check_positions(positions)
         linear = matrix[:3, :3] / max(float(np.abs(matrix[:3, :3]).max()), 1e-300)
@@ -137,7 +142,16 @@ class _Reader:
             faces = faces[:, ::-1]
         if normals is not None:
             normals = _transform_normals(normals, linear)
-        return Part(positions, faces, material, normals, uvs, colors)
+        part = Part(positions, faces, material, normals, uvs, second_uvs=second_uvs)
+        if material.normal_texture is not None and normals is not None:
+            tangents = self.format.read_tangents(mesh)
+            part = part if tangents is None else replace(part, tangents=place_tangents(tangents, normals, linear))
+        if colors is not None and len(colors) == len(faces) and len(colors) != len(vertices):
+            # Colours per face: give each face vertices of its own.
+            part = part.pick(faces.ravel(), np.arange(faces.size).reshape(-1, 3))
+            colors = np.repeat(colors, 3, axis=0)
+        part = replace(part, colors=colors)
+        return add_tangents(part) if material.normal_texture is not None and part.tangents is None else part
 
     def _check_positions(self, positions: Array) -> None:
         bad = int((~np.isfinite(positions).all(axis=1)).sum())
@@ -146,53 +160,77 @@ class _Reader:
         if np.abs(positions).max() > LARGEST:
             raise SceneError(f"{self.path}: vertices farther out than {LARGEST:g}; scale the model down")
 
-    def _read_attributes(self, mesh: Any, vertices: int, faces: int) -> tuple[Array | None, Array | None]:
-        """Return linear colours of vertices or faces, and texture coordinates."""
-        colors, uvs = self.format.read_colors(mesh), getattr(mesh.visual, "uv", None)
+    def _read_colors(self, mesh: Any, vertices: int, faces: int) -> Array | None:
+        """Return linear colours of vertices or faces."""
+        colors = self.format.read_colors(mesh)
         if colors is not None and len(colors) not in (vertices, faces):
             self.notes.append(f"{self.path.name}: colours do not fit the vertices and are ignored")
-            colors = None
-        uvs = np.array(uvs, dtype=np.float64) if uvs is not None and len(uvs) == vertices else None
-        if uvs is not None and not np.isfinite(uvs).all():
-            self.notes.append(f"{self.path.name}: texture coordinates that are NaN or infinite are taken as 0")
-            uvs[~np.isfinite(uvs)] = 0
-        return colors, move_uvs_home(uvs) if uvs is not None and len(uvs) else uvs
+            return None
+        return colors
 
-    def _read_material(self, mesh: Any, *, colored: bool, has_uvs: bool) -> Material:
+    def _read_uvs(self, uvs: Any, vertices: int) -> Array | None:
+        """Return texture coordinates that fit, finite."""
+        if uvs is None or len(uvs) != vertices:
+            return None
+        found = np.array(uvs, dtype=np.float64)
+        if not np.isfinite(found).all():
+            self.notes.append(f"{self.path.name}: texture coordinates that are NaN or infinite are taken as 0")
+            found[~np.isfinite(found)] = 0
+        return found
+
+    def _read_material(self, mesh: Any, *, colored: bool, uv_sets: Sequence[Array | None]) -> Material:
         """Return a mesh's material; its textures are those read so far."""
         material, images = self.format.read_material(getattr(mesh.visual, "material", None), colored=colored)
         found: dict[str, TextureRef | None] = {}
+        covers = (material.is_cut or material.name in self.covering) and "base_color" in images
+        covering = images["base_color"].image if covers else None
         for slot, image in images.items():
-            if has_uvs:
-                found[slot] = replace(image.use, number=self._read_texture(image))
+            if image.use.uv_set < len(uv_sets) and uv_sets[image.use.uv_set] is not None:
+                found[slot] = replace(image.use, number=self._read_texture(image, alpha=image.image is covering))
             else:
-                self.notes.append(
-                    f"{self.path.name}: no texture coordinates for {image.name}; its plain colour is taken"
-                )
+                self.notes.append(f"{self.path.name}: no texture coordinates for {image.name}; it is not used")
         if "base_color" in found and self.format.image_replaces_color:
             material = replace(material, base_color=WHITE)
         return material.with_textures(found)
 
-    def _read_texture(self, found: FileImage) -> int:
-        """Return the number of the texture of a PIL image, which is decoded once."""
+    def _read_texture(self, found: FileImage, *, alpha: bool) -> int:
+        """Return the number of the texture of a PIL image, which is decoded once. alpha: with its coverage."""
         image = found.image
-        if id(image) not in self.images:
+        if (id(image), alpha) not in self.images:
             self.texels += image.width * image.height
             if self.texels > MOST_TEXELS:
                 raise SceneError(f"{self.path}: its images have more than {MOST_TEXELS} pixels; scale them down")
-            self.images[id(image)] = len(self.textures), image  # which must live: its id must stay its own
-            self.textures.append(decode_texture(image, found.name, self.notes))
-        return self.images[id(image)][0]
+            self.images[id(image), alpha] = len(self.textures), image  # which must live: its id must stay its own
+            self.textures.append(decode_texture(image, found.name, alpha=alpha))
+        return self.images[id(image), alpha][0]
 
 
-def move_uvs_home(uvs: Array) -> Array:
-    """Move a mesh's texture coordinates (n, 2) towards 0 by whole numbers where they lie far out.
+def _pick_uvs(uvs: Array | None, number: int, material: Material) -> Array | None:
+    """Return the texture coordinates of set `number` as they are stored; None if no texture is read by them."""
+    used = [texture for texture in material.textures.values() if texture is not None and texture.uv_set == number]
+    return move_uvs_home(uvs, used) if uvs is not None and used and len(uvs) else None
 
-    Textures repeat, and 32-bit floats resolve small coordinates better.
+
+def move_uvs_home(uvs: Array, used: Sequence[TextureRef]) -> Array:
+    """Move texture coordinates (n, 2), by which textures are `used`, towards 0 where they lie far out.
+
+    They move by whole numbers, by which textures repeat, or are mirrored twice: 32-bit floats resolve small coordinates
+    better. Textures that are clamped, or scaled, hold them where they are.
     """
-    shift = np.round((uvs.min(axis=0) + uvs.max(axis=0)) / 2)
+    shift = np.zeros(2)
+    for axis in (0, 1):
+        wraps = {texture.sampler.wrap[axis] for texture in used}
+        if "clamp" not in wraps and all(_keeps_steps(texture) for texture in used):
+            step = 2 if "mirror" in wraps else 1
+            shift[axis] = np.round((uvs[:, axis].min() + uvs[:, axis].max()) / 2 / step) * step
     moved: Array = uvs - np.where(np.abs(shift) >= FAR_UVS, shift, 0)
     return moved
+
+
+def _keeps_steps(texture: TextureRef) -> bool:
+    """Return whether where a texture is read moves as its coordinates do."""
+    a, b, _, c, d, _ = texture.transform
+    return (a, b, c, d) == (1, 0, 0, 1)
 
 
 def _transform_normals(normals: Array, linear: Array) -> Array:

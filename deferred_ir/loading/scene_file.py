@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from deferred_ir.base.errors import SceneError, format_value
 from deferred_ir.base.image_size import parse_size
 from deferred_ir.base.toml_tables import Faults, Table, read_toml
 from deferred_ir.loading.light_tables import check_view, read_keyframes, read_lights
+from deferred_ir.loading.material_tables import MaterialOverride, read_materials
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.base import Light
 from deferred_ir.scene.motion import CameraMotion, ModelMotion
@@ -40,20 +42,24 @@ class ModelEntry:
 
 @dataclass(frozen=True)
 class SceneFile:
-    """The contents of a scene file; camera is None where it leaves that out. lights: a [spotlight] first."""
+    """The contents of a scene file; camera is None where it leaves that out. lights: a [spotlight] first.
+
+    materials: what replaces values of the models' materials, by name.
+    """
 
     name: str
     models: tuple[ModelEntry, ...]
     camera: Camera | None = None
     lights: tuple[Light, ...] = ()
     render: RenderDefaults = field(default_factory=RenderDefaults)
+    materials: Mapping[str, MaterialOverride] = field(default_factory=dict)
 
 
 def read(path: Path) -> SceneFile:
     """Read and check a scene file. Raises SceneError: one line with all faults, each with its key and the mend."""
     faults = Faults(str(path))
     data = read_toml(path, str(path), SceneError)
-    root = Table(faults, "", data, ("name", "model", "camera", "spotlight", "light", "render"))
+    root = Table(faults, "", data, ("name", "model", "camera", "spotlight", "light", "material", "render"))
     name = root.string("name")
     if name and not NAME.fullmatch(name):
         root.fault(
@@ -61,10 +67,10 @@ def read(path: Path) -> SceneFile:
         )
     models = _read_models(root, path.parent)
     camera, lights = _read_camera(root), read_lights(root, path.parent)
-    render = _read_render(root, path.parent)
+    render, materials = _read_render(root, path.parent), read_materials(root)
     if faults.found:
         faults.fail()
-    return SceneFile(name or path.stem, models, camera, lights, render)
+    return SceneFile(name or path.stem, models, camera, lights, render, materials)
 
 
 def _read_models(root: Table, folder: Path) -> tuple[ModelEntry, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from deferred_ir.base.files import write_whole
 from deferred_ir.loading.light_tables import SPOTLIGHT
+from deferred_ir.loading.material_tables import MaterialOverride
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.environment_image import EnvironmentImage
@@ -47,6 +48,7 @@ def make_tables(scene: SceneFile) -> dict[str, Any]:
         "camera": _make_camera(scene.camera) if scene.camera else None,
         "spotlight": _make_light(scene.lights[0]) if first else None,
         "light": [{"kind": light.kind, **_make_light(light)} for light in scene.lights[first:]] or None,
+        "material": {name: _make_material(override) for name, override in scene.materials.items()} or None,
         "render": _make_render(scene.render) or None,
     }
     return {key: table for key, table in tables.items() if table is not None}
@@ -79,6 +81,10 @@ def _make_camera(camera: Camera) -> dict[str, Any]:
     if camera.motion:
         table["motion"] = _make_keyframes(camera.motion)
     return table
+
+
+def _make_material(override: MaterialOverride) -> dict[str, Any]:
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in override.given.items()}
 
 
 def _make_light(light: Light) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import numpy as np
 from deferred_ir.gl.window import Window
 from deferred_ir.loading.load import builtin_scenes
 from deferred_ir.scene.camera import Camera
-from deferred_ir.viewer.lights import make_light
+from deferred_ir.viewer.edits.lights import make_light
 from deferred_ir.viewer.navigation import as_light, looks, move, turn, turn_light
 from deferred_ir.viewer.session import Session
 

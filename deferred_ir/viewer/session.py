@@ -26,10 +26,10 @@ from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.base import Light
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.scene.scene import Scene
-from deferred_ir.viewer.lights import LightList
+from deferred_ir.viewer.edits.lights import LightList
+from deferred_ir.viewer.edits.recording import Recorder
 from deferred_ir.viewer.navigation import as_camera, looks
 from deferred_ir.viewer.plan_changes import find_changed
-from deferred_ir.viewer.recording import Recorder
 
 PLOTTED = 240
 """Latest frames whose times are plotted."""

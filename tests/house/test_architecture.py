@@ -24,7 +24,7 @@ THIRD_PARTIES = {
     "trimesh": ("loading",),
     "PIL": ("loading", "output", "truth"),
     "OpenEXR": ("output",),
-    "OpenImageIO": ("scene",),
+    "OpenImageIO": ("loading", "scene"),
     "glfw": ("gl", "viewer"),
     "imgui_bundle": ("gl", "viewer"),
     "argparse": ("cli",),

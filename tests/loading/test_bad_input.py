@@ -106,7 +106,7 @@ def test_a_model_reads_the_scenes_folder_but_nothing_outside(tmp_path: Path) -> 
 def test_the_largest_image_is_one_that_drivers_take() -> None:
     image = Image.new("1", (8193, 8192))
     with pytest.raises(SceneError, match="big: 8193x8192 pixels, and 67108864 are the most; scale it down"):
-        decode_texture(image, "big", [])
+        decode_texture(image, "big")
 
 
 def test_many_images_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -170,6 +170,11 @@ def test_arcades_of_the_atrium_are_lit_indirectly_only():
     assert light.max() == 0
 
 
+def test_built_in_scenes_are_matt(scene: Scene):
+    assert not scene.has_gloss
+    assert not scene.has_cutouts
+
+
 def test_atrium_colours_are_exact_in_the_file():
     scene = load("atrium")
     for material in scene.materials:

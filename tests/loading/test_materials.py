@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import struct
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -230,11 +232,40 @@ def test_kinds_of_images(mode: str) -> None:
     else:
         image = Image.fromarray(grey).convert("RGB").convert(mode)
     assert image.mode == mode
-    notes: list[str] = []
-    texture = textures.decode_texture(image, "t.png", notes)
-    assert texture.pixels.dtype == np.uint8
-    assert np.abs(texture.pixels.astype(int) - grey[:, :, None]).max() <= (1 if mode in ("CMYK", "YCbCr") else 0)
-    assert bool(notes) == ("A" in mode)
+    deep = mode in ("I;16", "I", "F")
+    texture = textures.decode_texture(image, "t.png")
+    assert texture.pixels.dtype == (np.uint16 if deep else np.uint8)
+    found = texture.pixels.astype(int) - grey[:, :, None].astype(int) * (257 if deep else 1)
+    assert np.abs(found).max() <= (1 if mode in ("CMYK", "YCbCr") else 0)
+    covered = textures.decode_texture(image, "t.png", alpha=True)
+    assert covered.pixels.shape[2] == (4 if "A" in mode else 3)
+
+
+@pytest.mark.parametrize(("kind", "channels"), [(0, 1), (2, 3), (4, 2), (6, 4)], ids=["L", "RGB", "LA", "RGBA"])
+def test_png_of_16_bits_keep_them(kind: int, channels: int) -> None:
+    pixels = np.random.default_rng(kind).integers(0, 65536, (3, 5, channels)).astype(np.uint16)
+    image = textures.open_image(png_of_16_bits(pixels, kind))
+    found = textures.decode_texture(image, "t.png", alpha=True).pixels
+    assert found.dtype == np.uint16
+    colors = np.repeat(pixels[..., :1], 3, axis=2) if channels < 3 else pixels[..., :3]
+    assert np.array_equal(found[..., :3], colors)
+    assert found.shape[2] == (4 if channels in (2, 4) else 3)
+    if channels in (2, 4):
+        assert np.array_equal(found[..., 3], pixels[..., -1])
+    opaque = textures.decode_texture(textures.open_image(png_of_16_bits(pixels, kind)), "t.png")
+    assert np.array_equal(opaque.pixels, colors)
+
+
+def png_of_16_bits(pixels: Any, kind: int) -> bytes:
+    """A PNG file of uint16 (H, W, channels); kind: its colour type, by the PNG specification."""
+    height, width = pixels.shape[:2]
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in pixels)
+
+    def chunk(name: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, kind, 0, 0, 0))
+    return b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
 
 
 def test_vertex_colours_are_srgb_and_multiply(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from deferred_ir.loading import scene_file, scene_file_writer
+from deferred_ir.loading.material_tables import MaterialOverride
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.directional import Directional
@@ -39,11 +40,17 @@ LIGHTS = (
 MODELS = (ModelEntry(Path("/models/a b.obj"), 0.5, A, MOTION), ModelEntry(Path("/models/ü.glb"), lights=False))
 RENDER = RenderDefaults("accurate", (640, 480), 32, 7, {"tonemap.exposure": "auto", "vpl.clamp": 0.1, "vpl.bounces": 2})
 
+MATERIALS = {
+    "red wall": MaterialOverride((0.5, 0.0, 1.0), 0.25, 0.0, (1e6, 0.0, 0.5), 0.5, 1.33, 0.1, -2.0),
+    'a "b" ü.\\': MaterialOverride(roughness=0.125),
+    "plain": MaterialOverride(),
+}
+
 
 @pytest.mark.parametrize(
     "scene",
     [
-        SceneFile("hall", MODELS, CAMERA, (LIGHT, *LIGHTS), RENDER),
+        SceneFile("hall", MODELS, CAMERA, (LIGHT, *LIGHTS), RENDER, MATERIALS),
         SceneFile("hall", MODELS, replace(CAMERA, motion=None), (KEYFRAMED,), RenderDefaults("/graphs/mine.toml")),
         SceneFile("ü [2] \"quoted\" #", MODELS[1:]),
     ],

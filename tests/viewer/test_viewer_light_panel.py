@@ -152,7 +152,7 @@ def test_keys_act_on_the_selected_light(viewer):
 
 
 def test_all_lights_are_saved_and_their_ways_play(viewer, tmp_path, monkeypatch):
-    from deferred_ir.viewer import recording
+    from deferred_ir.viewer.edits import recording
 
     monkeypatch.setattr(panels, "FOLDER", tmp_path)
     monkeypatch.setattr(recording, "PERIOD", 0.0)

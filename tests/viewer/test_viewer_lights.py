@@ -18,10 +18,10 @@ from deferred_ir.scene.lights.rect import Rect
 from deferred_ir.scene.lights.spot import Spot
 from deferred_ir.scene.lights.spotlight import Spotlight
 from deferred_ir.scene.motion import KeyframedLight, LissajousMotion
-from deferred_ir.viewer.lights import LightList, make_light, set_field
+from deferred_ir.viewer.edits.lights import LightList, make_light, set_field
+from deferred_ir.viewer.edits.recording import Recorder
 from deferred_ir.viewer.navigation import as_camera, as_light, looks, turn_light
 from deferred_ir.viewer.panels.light_fields import name_field, split_strength
-from deferred_ir.viewer.recording import Recorder
 from deferred_ir.viewer.saving import describe_lights
 
 KINDS = find_kinds()

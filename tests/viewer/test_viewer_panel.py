@@ -214,7 +214,7 @@ def test_models_that_move_play_and_are_saved_where_they_are(viewer, moving, tmp_
 
 
 def test_a_camera_path_is_recorded_by_the_checkbox_played_and_saved(viewer, tmp_path, monkeypatch):
-    from deferred_ir.viewer import recording
+    from deferred_ir.viewer.edits import recording
 
     monkeypatch.setattr(panels, "FOLDER", tmp_path)
     monkeypatch.setattr(recording, "PERIOD", 0.0)

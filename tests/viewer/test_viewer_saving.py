@@ -62,7 +62,7 @@ def test_a_name_with_brackets_is_not_written_over(tmp_path):
 
 
 def test_a_recorded_way_is_saved_and_plays(viewer, tmp_path, monkeypatch):
-    from deferred_ir.viewer import recording as path
+    from deferred_ir.viewer.edits import recording as path
 
     monkeypatch.setattr(panels, "FOLDER", tmp_path)
     monkeypatch.setattr(path, "PERIOD", 0.0)

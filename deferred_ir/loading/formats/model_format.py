@@ -70,6 +70,15 @@ class ModelFormat(ABC):
             raise SceneError(f"{self.path}: vertex colours must be finite and 0 or more; export it again")
         return self.decode_colors(values)
 
+    def read_uvs(self, mesh: Any) -> tuple[Array | None, Array | None]:
+        """Read both sets of texture coordinates, (n, 2), v upwards; None for one that is not there."""
+        return getattr(mesh.visual, "uv", None), None
+
+    def read_tangents(self, mesh: Any) -> Array | None:
+        """Read the tangents of a mesh's vertices, (n, 4), as in `Geometry`; None if it has none."""
+        del mesh
+        return None
+
     def decode_colors(self, values: Array) -> Array:
         """Decode the colours that a file stores with its vertices, (n, 3): sRGB in 0 to 1 or in 0 to 255."""
         return linear_from_srgb(values / 255 if values.max() > 1 else values)

@@ -1,35 +1,29 @@
 """Corrects OBJ and MTL files before trimesh reads them, for what it passes over.
 
 trimesh knows one `mtllib`, finds the word even in a comment, counts negative indices from the end of the whole file,
-skips missing materials and images without a word, and rounds Kd to 8 bits.
+skips missing materials and images without a word, rounds Kd to 8 bits, and knows no other keys.
 """
 
 from __future__ import annotations
 
-import io
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from deferred_ir.base.errors import SceneError
-from deferred_ir.loading.asset_paths import Assets, strip_options
+from deferred_ir.loading.asset_paths import Assets
 from deferred_ir.loading.formats.model_format import FileImage, FileMaterial, ModelFormat, choose_plain_albedo
-from deferred_ir.loading.model_data import check_albedo, check_emission
+from deferred_ir.loading.formats.mtl import MtlMaterial, describe_losses, read_materials
+from deferred_ir.loading.model_data import check_albedo, check_emission, check_factor
+from deferred_ir.loading.textures import decode_texture, join_greys, open_image
 from deferred_ir.scene.surfaces.materials import WHITE, Material
 
 MATERIALS = "materials.mtl"
 """Name under which all materials of a model are handed to trimesh."""
-
-
-@dataclass(frozen=True)
-class MtlMaterial:
-    """An MTL material: the numbers of Kd and Ke (unrounded, none if it has none), and their images."""
-
-    kd: tuple[float, ...] = ()
-    image: str | None = None
-    ke: tuple[float, ...] = ()
-    glow: str | None = None
+NOTHING = MtlMaterial({})
+"""A material of which no MTL file says anything."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +37,7 @@ class ObjFile:
 
 
 class ObjFormat(ModelFormat):
-    """An OBJ file with its MTL files. An image (map_Kd) replaces the colour (Kd)."""
+    """An OBJ file with its MTL files. Images replace the numbers beside them, except that map_Ke multiplies Ke."""
 
     def __init__(self, path: Path, data: bytes, root: Path | None) -> None:
         file = read(path, data, root)
@@ -53,38 +47,68 @@ class ObjFormat(ModelFormat):
         self._images: dict[str, Any] = {}
 
     def read_material(self, material: Any, colored: bool) -> FileMaterial:
-        """Return Kd, unrounded, Ke and the images map_Kd and map_Ke of the file's material of that name."""
+        """Return what the file's material of that name says, its numbers unrounded."""
         plain = choose_plain_albedo(colored)
         if material is None:
             return FileMaterial(Material("default", plain))
         image = self.find_image(material)
         fills_in = image is None and getattr(material, "image", None) is not None
-        known = MtlMaterial() if fills_in else self._materials.get(material.name, MtlMaterial())
-        self.require_image(material, image, known.image)
-        if material.name in self._materials and not known.kd and image is None:
+        known = self._materials.get(material.name, NOTHING)
+        kd, wanted = ((), None) if fills_in else (known.read_numbers("kd"), known.find_file("map_kd"))
+        self.require_image(material, image, wanted)
+        if material.name in self._materials and not kd and image is None:
             self.notes.append(f"{self.path.name}: material {material.name} has no Kd that can be read; it is grey")
-        albedo = check_albedo(known.kd, self.locate(material), self.notes) if known.kd else plain
-        found = Material(material.name, albedo)
+        albedo = check_albedo(kd, self.locate(material), self.notes) if kd else plain
         images = {}
         if image is not None:
-            images["base_color"] = FileImage(image, known.image or f"texture of {material.name}")
-        known = self._materials.get(material.name, MtlMaterial())
-        if known.ke or known.glow:
-            # An image alone counts as it is.
-            radiance = check_emission(known.ke or WHITE, self.locate(material))
-            found = replace(found, emission=radiance, emits_both_sides=True)
-            if any(radiance) and known.glow is not None:
-                images["emission"] = FileImage(self._open_image(material, known.glow), known.glow)
-        return FileMaterial(found, images)
+            images["base_color"] = FileImage(image, wanted or f"texture of {material.name}", known.read_use("map_kd"))
+        found = self._add_emission(Material(material.name, albedo), known, material, images)
+        return FileMaterial(self._add_gloss(found, known, material, images), images)
+
+    def _add_emission(
+        self, found: Material, known: MtlMaterial, material: Any, images: dict[str, FileImage]
+    ) -> Material:
+        """Return the material with Ke, and add the image map_Ke, which counts as it is where there is no Ke."""
+        ke, wanted = known.read_numbers("ke"), known.find_file("map_ke")
+        if not ke and wanted is None:
+            return found
+        radiance = check_emission(ke or WHITE, self.locate(material))
+        if any(radiance) and wanted is not None:
+            images["emission"] = FileImage(self._open_image(material, wanted), wanted, known.read_use("map_ke"))
+        return replace(found, emission=radiance, emits_both_sides=True)
+
+    def _add_gloss(self, found: Material, known: MtlMaterial, material: Any, images: dict[str, FileImage]) -> Material:
+        """Return the material with Pr and Pm, which images replace, and add these and `norm`."""
+        if (wanted := known.find_file("norm")) is not None:
+            images["normal"] = FileImage(self._open_image(material, wanted), wanted, known.read_use("norm"))
+        if not known.is_glossy:
+            return found
+        where = self.locate(material)
+        maps: dict[str, str] = {}
+        values: dict[str, Any] = {}
+        for key, field, missing in (("pr", "roughness", 1.0), ("pm", "metallic", 0.0)):
+            given = known.read_number(key)
+            values[field] = check_factor(missing if given is None else given, key.title(), where, self.notes, most=1.0)
+            if (wanted := known.find_file(f"map_{key}")) is not None:
+                maps[key], values[field] = wanted, 1.0
+        if maps:
+            name = " and ".join(dict.fromkeys(maps.values()))
+            use = known.read_use(f"map_{next(iter(maps))}")
+            images["metallic_roughness"] = FileImage(self._join_images(material, maps), name, use)
+        return replace(found, specular=1.0, **values)
+
+    def _join_images(self, material: Any, maps: Mapping[str, str]) -> Any:
+        """Return one image, with roughness (pr) in green and metallic (pm) in blue, of the two, once."""
+        key = "\n".join([maps.get("pr", ""), maps.get("pm", "")])
+        if key not in self._images:
+            greys = {each: decode_texture(self._open_image(material, name), name) for each, name in maps.items()}
+            self._images[key] = join_greys([None, greys.get("pr"), greys.get("pm")])
+        return self._images[key]
 
     def _open_image(self, material: Any, name: str) -> Any:
-        from PIL import Image
-
         if name not in self._images:
-            try:
-                self._images[name] = Image.open(io.BytesIO(self.assets[name]))
-            except (OSError, ValueError):  # FileNotFoundError is one, and so is what PIL does not know
-                self.require_image(material, None, name)
+            self._images[name] = open_image(self.assets[name]) if self.assets.path(name) else None
+        self.require_image(material, self._images[name], name)
         return self._images[name]
 
 
@@ -105,13 +129,16 @@ def read(path: Path, data: bytes, root: Path | None = None) -> ObjFile:
             libraries.append(_decode(found.read_bytes()))
             if found.parent not in assets.folders:
                 assets.folders.append(found.parent)
-    materials = _read_materials("\n".join(libraries))
+    materials = read_materials("\n".join(libraries))
     # trimesh drops all materials over one value that it does not expect, so it gets names and images only.
-    lines = ((f"newmtl {name}", f"map_Kd {m.image}" if m.image else "") for name, m in materials.items())
+    images = {name: material.find_file("map_kd") for name, material in materials.items()}
+    lines = ((f"newmtl {name}", f"map_Kd {image}" if image else "") for name, image in images.items())
     assets.blobs[MATERIALS] = "\n".join(line for pair in lines for line in pair).encode()
     used = {" ".join(name.split()) for name in re.findall(r"^usemtl[ \t]+(.*)", text, re.MULTILINE)}
     if missing := sorted(used - materials.keys()):
         notes.append(f"{path.name}: no material {', '.join(missing)}; its surfaces are grey")
+    losses = describe_losses(material for name, material in materials.items() if name in used)
+    notes += [f"{path.name}: {loss}" for loss in losses]
     text = re.sub(r"^.*\bmtllib\b.*$", "", text, flags=re.MULTILINE)
     text = f"mtllib {MATERIALS}\n{_make_indices_absolute(text)}"
     if re.search(r"^f[^\n#]*[ \t/](0+|-\d+)(?![\d.])", text, re.MULTILINE):
@@ -132,35 +159,6 @@ def _decode(data: bytes) -> str:
 def _split_library_names(names: str, assets: Assets) -> list[str]:
     """Return the files of one `mtllib` line: one name with spaces, or several names."""
     return [names] if assets.path(names) or " " not in names else names.split()
-
-
-def _read_materials(mtl: str) -> dict[str, MtlMaterial]:
-    """Read the materials of an MTL text by name; of two with the same name the later counts."""
-    materials: dict[str, MtlMaterial] = {}
-    name = ""
-    for line in mtl.splitlines():
-        key, *rest = line.split(maxsplit=1) or [""]
-        key, value = key.lower(), rest[0] if rest else ""
-        if key == "newmtl":
-            name = " ".join(value.split())
-            materials[name] = MtlMaterial()
-        elif name and key == "kd":
-            materials[name] = replace(materials[name], kd=_parse_numbers(value))
-        elif name and key == "map_kd" and value.strip():
-            materials[name] = replace(materials[name], image=strip_options(value).strip())
-        elif name and key == "ke":
-            materials[name] = replace(materials[name], ke=_parse_numbers(value))
-        elif name and key == "map_ke" and value.strip():
-            materials[name] = replace(materials[name], glow=strip_options(value).strip())
-    return materials
-
-
-def _parse_numbers(text: str) -> tuple[float, ...]:
-    """Return the numbers of a line before its comment; none for anything else, such as `spectral file.rfl`."""
-    try:
-        return tuple(float(word) for word in text.partition("#")[0].split())
-    except ValueError:
-        return ()
 
 
 def _make_indices_absolute(text: str) -> str:

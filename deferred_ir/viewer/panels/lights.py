@@ -6,7 +6,7 @@ from typing import Any
 
 from deferred_ir.scene.lights.kinds import find_kinds
 from deferred_ir.viewer.controls import Controls
-from deferred_ir.viewer.lights import set_field
+from deferred_ir.viewer.edits.lights import set_field
 from deferred_ir.viewer.navigation import looks
 from deferred_ir.viewer.panels.light_fields import LightFields
 from deferred_ir.viewer.session import Session

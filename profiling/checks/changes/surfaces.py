@@ -75,7 +75,9 @@ def texture_checkers(scene: Scene, shift: float = 0.0) -> Scene:
 
 def _with_texture(scene: Scene, pixels: Array, shift: float) -> Scene:
     plain = with_albedo(scene, 1.0)
-    uvs = move_uvs_home((plain.geometry.positions - plain.geometry.bounds[0])[:, :2] / plain.geometry.diagonal + shift)
+    uvs = move_uvs_home(
+        (plain.geometry.positions - plain.geometry.bounds[0])[:, :2] / plain.geometry.diagonal + shift, [TextureRef(0)]
+    )
     paper = replace(
         plain,
         materials=tuple(replace(material, base_color_texture=TextureRef(0)) for material in plain.materials),

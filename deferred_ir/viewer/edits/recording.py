@@ -9,7 +9,7 @@ from typing import Any
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.base import Light
 from deferred_ir.scene.motion import CameraMotion, KeyframedLight
-from deferred_ir.viewer.lights import Entry
+from deferred_ir.viewer.edits.lights import Entry
 
 PERIOD = 0.2
 """Seconds between two keyframes."""

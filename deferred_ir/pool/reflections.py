@@ -33,7 +33,7 @@ WIDE, ALIKE = 0.1, 0.1
 """Of lobes wider than this, roughness 0.32, a sample's reflections stand for pixels around it whose roughness differs
 by no more than the second."""
 TIMES = 4
-"""Where rays of narrower lobes first hit, light is drawn so many times: the filter that follows finds little to average."""
+"""Where rays of narrower lobes first hit, light is drawn so many times: the filter finds little to average there."""
 LEAST_SHARE = 0.02
 """Reflectances below this are taken as this where light is carried over its reflectance."""
 

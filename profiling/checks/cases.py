@@ -11,18 +11,9 @@ from deferred_ir.profiling.checks.changes import lights
 from deferred_ir.profiling.checks.changes import surfaces as surface
 from deferred_ir.profiling.checks.changes import triangles as shape
 from deferred_ir.profiling.checks.changes import views as change
-from deferred_ir.profiling.checks.extremes import HALF_FLOAT, Case
+from deferred_ir.profiling.checks.extremes import MOVED, ROUNDED, TEXELS, Case
+from deferred_ir.profiling.checks.surface_cases import GLOSS, SURFACES
 
-ROUNDING = 2.0**-24
-"""Relative rounding error of a 32-bit float."""
-ROUNDED = 16 * ROUNDING
-"""Bound where a few factors are rounded differently."""
-TEXELS = 256
-"""Width of a VPL's map, unless a case sets another."""
-MOVED = 8 * TEXELS * ROUNDING
-"""Bound where coordinates are rounded differently: edges in maps move by this fraction of a texel."""
-NORMALS = 2.0**-14
-"""Bound where normals are rounded differently before they are stored in 16 bits."""
 SAME, OTHER = 1.5, 4.0
 """Slack where light and view stay, and where they change."""
 
@@ -154,30 +145,6 @@ TRIANGLES = (
         for name, tilt in (("upright", 0.0), ("aslant", pi / 5))
     ),
 )
-SURFACES = (
-    Case("normals 0", partial(surface.with_normals, value=0.0), "itself", expected=surface.remove_normals),
-    Case("normals NaN", partial(surface.with_normals, value=float("nan")), "itself", expected=surface.remove_normals),
-    Case(
-        "normals against the faces", surface.reverse_normals, "itself", expected=surface.remove_normals, bound=NORMALS
-    ),
-    *(
-        Case(
-            f"texture {side}x{side}",
-            partial(surface.texture_grey, size=side),
-            "itself",
-            expected=surface.paint_grey,
-            bound=HALF_FLOAT,
-        )
-        for side in (1, 8192)
-    ),
-    Case(
-        "texture coordinates 1e4",
-        partial(surface.texture_checkers, shift=1e4),
-        "itself",
-        expected=surface.texture_checkers,
-        bound=MOVED,
-    ),
-)
 SIZES = (
     *(
         Case(f"maps {side}x{side}", slack=coarse(side), settings={"shadow_maps.vpl_size": side}, vpls=4)
@@ -188,7 +155,7 @@ SIZES = (
 )
 
 
-NAMED = {case.name: case for case in (*SCALE, *AWAY, *CAMERA, *LIGHT, *KINDS, *TRIANGLES, *SURFACES, *SIZES)}
+NAMED = {case.name: case for case in (*SCALE, *AWAY, *CAMERA, *LIGHT, *KINDS, *TRIANGLES, *SURFACES, *GLOSS, *SIZES)}
 
 
 def _repeat(graph: str, *names: str) -> tuple[Case, ...]:

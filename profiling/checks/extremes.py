@@ -18,6 +18,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import Error
 from deferred_ir.engine.renderer import Renderer
+from deferred_ir.profiling.checks.changes.furnace import find_error
 from deferred_ir.profiling.checks.changes.views import Unsuited, freeze, same
 from deferred_ir.profiling.checks.trace_points import trace_with_points
 from deferred_ir.scene.scene import Scene
@@ -28,7 +29,17 @@ SIZE = (128, 128)
 VPLS = 64
 HALF_FLOAT = 2.0**-11
 """Relative rounding error of the G-buffer's albedo: no image is sure to be nearer to rays."""
-Against = Literal["rays", "itself", "black", "unshadowed"]
+ROUNDING = 2.0**-24
+"""Relative rounding error of a 32-bit float."""
+ROUNDED = 16 * ROUNDING
+"""Bound where a few factors are rounded differently."""
+TEXELS = 256
+"""Width of a VPL's map, unless a case sets another."""
+MOVED = 8 * TEXELS * ROUNDING
+"""Bound where coordinates are rounded differently: edges in maps move by this fraction of a texel."""
+NORMALS = 2.0**-14
+"""Bound where normals are rounded differently before they are stored in 16 bits."""
+Against = Literal["rays", "itself", "black", "unshadowed", "furnace"]
 
 
 @dataclass(frozen=True)
@@ -36,7 +47,8 @@ class Case:
     """One extreme case: a change of a scene, and how far the image may differ from the expected one.
 
     against: `rays`, the same VPLs with visibility by rays; `itself`, an image that must not change; `black`;
-    `unshadowed`, the image without shadows, which no image with shadows may exceed. slack: for `rays`, the largest
+    `unshadowed`, the image without shadows, which no image with shadows may exceed; `furnace`, what a ball reflects in
+    light that is the same from all around (furnace.py). slack: for `rays`, the largest
     figure as a multiple of `Judge.usual_error`. bound: for the others, the largest figure. expected: the change of the
     scene for the expected image of `itself`. gain: factor by which the image must be brighter than that. middle: size
     of the expected image if it is larger; then its middle is compared. settings, size, vpls and graph apply to both
@@ -132,6 +144,8 @@ class Judge:
             return inf
         if case.against == "black":
             return float(image.max())
+        if case.against == "furnace":
+            return find_error(changed, image, case.size)
         if case.against == "itself":
             expected = self._render_expected(scene, case) * case.gain
             return _ratio(np.abs(image - expected).sum(), expected.sum())

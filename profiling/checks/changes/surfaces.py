@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from deferred_ir.base.arrays import Array
 from deferred_ir.loading.models import move_uvs_home
 from deferred_ir.profiling.checks.changes.triangles import with_geometry
+from deferred_ir.profiling.checks.changes.views import brighten, put_camera_at_wall
 from deferred_ir.scene.scene import Scene
 from deferred_ir.scene.surfaces.materials import Texture, TextureRef
 
@@ -65,6 +67,59 @@ def paint_grey(scene: Scene) -> Scene:
 def texture_grey(scene: Scene, size: int) -> Scene:
     """Make all surfaces grey by a texture of size x size texels."""
     return _with_texture(scene, np.full((size, size, 3), GREY, np.uint8), 0.0)
+
+
+def texture_grey_finely(scene: Scene) -> Scene:
+    """Make all surfaces grey by a texture of 16 bits."""
+    return _with_texture(scene, np.full((4, 4, 3), GREY * 257, np.uint16), 0.0)
+
+
+def with_gloss(scene: Scene, **numbers: float) -> Scene:
+    """Change numbers of all materials, which have a full coat unless these say otherwise."""
+    changed: dict[str, Any] = {"specular": 1.0, **numbers}
+    return replace(scene, materials=tuple(replace(material, **changed) for material in scene.materials))
+
+
+def turn_to_black_metal(scene: Scene) -> Scene:
+    """Make all surfaces metals that reflect nothing head-on."""
+    return with_gloss(with_albedo(scene, 0.0), metallic=1.0, roughness=0.3)
+
+
+def bend_normals(scene: Scene, x: float, z: float) -> Scene:
+    """Give all surfaces a normal map of one texel, (x, 0, z)."""
+    texel = np.round((np.array([[[x, 0.0, z]]]) + 1) * 32767.5).astype(np.uint16)
+    number = len(scene.textures)
+    normal = TextureRef(number)
+    materials = tuple(replace(material, normal_texture=normal, specular=1.0) for material in scene.materials)
+    g = scene.geometry
+    along = np.where(np.abs(g.face_normals[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
+    along = along - (along * g.face_normals).sum(axis=1, keepdims=True) * g.face_normals
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    apart = _separate_faces(scene, None)
+    tangents = np.column_stack([np.repeat(along, 3, axis=0), np.ones(3 * len(g.faces))]).astype(np.float32)
+    uvs = apart.geometry.uvs if apart.geometry.uvs is not None else np.zeros((len(tangents), 2), np.float32)
+    bent = replace(apart, materials=materials, textures=(*scene.textures, Texture("bent", texel)))
+    return with_geometry(bent, tangents=tangents, uvs=uvs)
+
+
+def coat_white(scene: Scene, roughness: float) -> Scene:
+    """Make all surfaces white below a coat."""
+    return with_gloss(with_albedo(scene, 1.0), roughness=roughness)
+
+
+def look_along_coated_wall(scene: Scene, off: float) -> Scene:
+    """Coat all surfaces, and look along a wall."""
+    return with_gloss(put_camera_at_wall(scene, fraction=off, along=True), roughness=0.2)
+
+
+def brighten_coated(scene: Scene, factor: float) -> Scene:
+    """Coat all surfaces, and make lights `factor` times as bright."""
+    return with_gloss(brighten(scene, factor), roughness=0.4)
+
+
+def without_map(scene: Scene) -> Scene:
+    """Make the scene of `bend_normals` without the map: faces with a coat, and no shading normals."""
+    return with_gloss(remove_normals(scene))
 
 
 def texture_checkers(scene: Scene, shift: float = 0.0) -> Scene:

@@ -60,8 +60,8 @@ def _read_model(entry: ModelEntry, path: Path, index: int, described: SceneFile)
     covering = [name for name, override in overrides.items() if override.alpha_cutoff is not None]
     try:
         read = models.read(entry.path, entry.scale, entry.translate, root=path.parent, covering=covering)
-        read = replace(read, parts=tuple(_override(part, read, overrides) for part in read.parts))
-        return read if entry.lights else darken(read)
+        read = read if entry.lights else darken(read)
+        return replace(read, parts=tuple(_override(part, read, overrides) for part in read.parts))
     except SceneError as error:
         if entry.path == path:
             raise

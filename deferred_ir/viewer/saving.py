@@ -20,6 +20,7 @@ from deferred_ir.graph.file import graph_names
 from deferred_ir.graph.graph import Graph
 from deferred_ir.graph.params import specs
 from deferred_ir.loading import scene_file, scene_file_writer
+from deferred_ir.loading.material_tables import merge_overrides
 from deferred_ir.loading.scene_file import ModelEntry, SceneFile
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.base import Light
@@ -76,7 +77,8 @@ def _is_builtin(graph: str) -> bool:
 def describe_scene(session: Session, stem: str) -> SceneFile:
     """Return the content of the scene file NAME.toml of what is on screen; stem: NAME."""
     scene, path = session.scene, session.scene.path
-    entries = scene_file.read(path).models if path.suffix.lower() == ".toml" else (ModelEntry(path),)
+    is_file = path.suffix.lower() == ".toml"
+    described = scene_file.read(path) if is_file else SceneFile(path.stem, (ModelEntry(path),))
     builtin = _is_builtin(session.graph)
     render = RenderDefaults(
         graph=session.graph if builtin else f"{stem}{GRAPH}",
@@ -84,8 +86,9 @@ def describe_scene(session: Session, stem: str) -> SceneFile:
         seed=session.seed,
         set=session.settings if builtin else {},
     )
-    models = tuple(_place_model(entry, session.time) for entry in entries)
-    return SceneFile(scene.name, models, _choose_camera(session), describe_lights(session), render)
+    models = tuple(_place_model(entry, session.time) for entry in described.models)
+    materials = merge_overrides(described.materials, session.materials.overrides)
+    return SceneFile(scene.name, models, _choose_camera(session), describe_lights(session), render, materials)
 
 
 def _choose_camera(session: Session) -> Camera:

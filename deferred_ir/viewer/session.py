@@ -27,6 +27,7 @@ from deferred_ir.scene.lights.base import Light
 from deferred_ir.scene.motion import FRAMES_PER_SECOND
 from deferred_ir.scene.scene import Scene
 from deferred_ir.viewer.edits.lights import LightList
+from deferred_ir.viewer.edits.materials import MaterialList
 from deferred_ir.viewer.edits.recording import Recorder
 from deferred_ir.viewer.navigation import as_camera, looks
 from deferred_ir.viewer.plan_changes import find_changed
@@ -67,7 +68,7 @@ class Session:
         self._undo: Callable[[], None] = lambda: None
         self._still = False
         self.drawn: Plan | None = None
-        self.lights = LightList(self.invalidate)
+        self.lights, self.materials = LightList(self.invalidate), MaterialList(self.invalidate)
         self.use(scene)
         self.plan = self._make_plan(self.shown)
 
@@ -76,6 +77,7 @@ class Session:
     def use(self, scene: Scene) -> None:
         """Show `scene`, from the start of its motions."""
         self.lights.use(scene.lights)
+        self.materials.use(scene)
         self.scene, self.time = scene, 0.0
         self._place()
 
@@ -108,7 +110,8 @@ class Session:
     @property
     def shown(self) -> Scene:
         """The scene as it is drawn."""
-        return replace(self.scene, geometry=self.geometry, camera=self.eye, lights=self.lights.shining)
+        surfaces = replace(self.scene, geometry=self.geometry, materials=self.materials.shown)
+        return replace(surfaces, camera=self.eye, lights=self.lights.shining)
 
     def invalidate(self) -> None:
         """Ask for a new picture: camera, lights, scene or seed have changed."""
@@ -241,7 +244,8 @@ class Session:
         self.plan, before = self._make_plan(self.shown), self.drawn
         if self._still and self.plan is before:
             return self._accumulate()
-        if self.accumulation and self._still and before and self._keeps_mean(before):
+        readers = find_readers(self.plan, self.plan.outputs["radiance"])  # if only these differ, the mean stays
+        if self.accumulation and self._still and before and find_changed(before, self.plan) <= readers:
             self.accumulation.follow(self.plan)
             self.accumulation.show()
             ran = True
@@ -251,10 +255,6 @@ class Session:
         # Passes that carry state from frame to frame may take some frames to come to rest (graph `incremental`).
         self.drawn, self._still, self._undo = self.plan, self.accumulation is not None or not ran, lambda: None
         return ran
-
-    def _keeps_mean(self, before: Plan) -> bool:
-        """Return whether the plan differs from `before` only in passes that read the mean."""
-        return find_changed(before, self.plan) <= find_readers(self.plan, self.plan.outputs["radiance"])
 
     def _draw_frame(self) -> bool:
         """Draw a frame. Returns whether any pass had to run."""

@@ -83,9 +83,9 @@ def test_alpha_is_kept_where_a_table_cuts_by_it(tmp_path: Path) -> None:
     assert {material.alpha_cutoff for material in scene.materials} == {0.5, None}
 
 
-def test_a_dark_model_stays_dark(tmp_path: Path) -> None:
-    scene = scene_with(tmp_path, 'lights = false\n[material."red wall"]\nemission = [1, 2, 3]\n')
-    assert all(not material.emits for material in scene.materials)
+def test_a_table_lights_a_dark_model(tmp_path: Path) -> None:
+    scene = scene_with(tmp_path, "lights = false\n[material.plain]\nemission = [1, 2, 3]\n")
+    assert {m.name: m.emission for m in scene.materials} == {"red wall": BLACK, "plain": (1, 2, 3)}
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,26 @@ def name_field(name: str) -> str:
     return name.replace("_", " ").replace("fov", "FOV")
 
 
+def draw_strong_colour(imgui: Any, name: str, value: Vec3, base: Vec3) -> Vec3 | None:
+    """Draw a colour whose channels have no upper bound: their ratio, and the largest. Returns a new one, or None.
+
+    base: the colour that it came with, which the slider's range is taken from.
+    """
+    label = name_field(name)
+    colour, strength = split_strength(value, base)
+    flags = imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.no_alpha
+    picked, new = imgui.color_edit3(f"colour##{name}", list(colour), flags)
+    imgui.set_item_tooltip(f"linear RGB of the {label}, over its largest channel")
+    most = BRIGHTEST * (max(base) or 1.0)
+    moved, power = imgui.slider_float(label, strength, 0.0, most, "%.4g", imgui.SliderFlags_.logarithmic)
+    imgui.set_item_tooltip("The largest channel. Ctrl and click to type a number.")
+    if picked and any(new):
+        colour = split_strength((new[0], new[1], new[2]), base)[0]
+    if not (picked or moved):
+        return None
+    return colour[0] * power, colour[1] * power, colour[2] * power
+
+
 class LightFields:
     """Draws a row a field. Returns the edits that the user makes instead of making them."""
 
@@ -68,19 +88,7 @@ class LightFields:
         imgui, label = self._imgui, name_field(name)
         if value is None:
             return (1.0, 1.0, 1.0) if imgui.button(f"constant {label}") else None
-        base = base or (1.0, 1.0, 1.0)
-        colour, strength = split_strength(value, base)
-        flags = imgui.ColorEditFlags_.float | imgui.ColorEditFlags_.no_alpha
-        picked, new = imgui.color_edit3(f"colour##{name}", list(colour), flags)
-        imgui.set_item_tooltip(f"linear RGB of the {label}, over its largest channel")
-        most = BRIGHTEST * (max(base) or 1.0)
-        moved, power = imgui.slider_float(label, strength, 0.0, most, "%.4g", imgui.SliderFlags_.logarithmic)
-        imgui.set_item_tooltip("The largest channel. Ctrl and click to type a number.")
-        if picked and any(new):
-            colour = split_strength((new[0], new[1], new[2]), base)[0]
-        if not (picked or moved):
-            return None
-        return colour[0] * power, colour[1] * power, colour[2] * power
+        return draw_strong_colour(imgui, name, value, base or (1.0, 1.0, 1.0))
 
     def _draw_point(self, name: str, value: Vec3, diagonal: float) -> Vec3 | None:
         touched, new = self._imgui.drag_float3(name_field(name), list(value), STEP * diagonal, 0.0, 0.0, "%.4g")

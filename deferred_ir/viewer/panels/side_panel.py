@@ -20,6 +20,7 @@ from deferred_ir.viewer.panels.light_axes import draw_axes
 from deferred_ir.viewer.panels.light_outlines import draw_outlines
 from deferred_ir.viewer.panels.lights import LightsPanel
 from deferred_ir.viewer.panels.lines import Overlay
+from deferred_ir.viewer.panels.materials import MaterialsPanel
 from deferred_ir.viewer.panels.parameters import draw_widget
 from deferred_ir.viewer.panels.passes import PassesPanel
 from deferred_ir.viewer.panels.reference import ReferencePanel
@@ -42,6 +43,7 @@ class Panel:
         self._imgui, self._implot = imgui, implot
         self._window, self._session, self._controls = window, session, controls
         self.lights = LightsPanel(imgui, session, controls)
+        self.materials = MaterialsPanel(imgui, session)
         self.passes = PassesPanel(imgui, session)
         self.maps = ShadowMapsPanel(imgui, session, controls)
         self.reference = ReferencePanel(imgui, session)
@@ -80,6 +82,7 @@ class Panel:
         for name, part, is_open in (
             ("Scene", self._scene, True),
             ("Lights", self.lights.draw, True),
+            ("Materials", self.materials.draw, False),
             ("Passes", self.passes.draw, True),
             ("Parameters", self._parameters, False),
             ("Reference", self.reference.draw, False),

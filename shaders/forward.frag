@@ -32,6 +32,25 @@ uniform int count;
 
 layout(location = 0) out vec4 radiance;
 
+#if !DIRECT
+// Adds VPL `i` of the draw, and its shadow by its own map.
+#if HAS_VPL_MAPS
+#define VISIBILITY(i) vpl_visibility(vpl_maps[i], vpls[numbers[i]], p.position, p.normal)
+#else
+#define VISIBILITY(i) 1.0
+#endif
+#define ADD_VPL(i) if (i < count) add_vpl(r, p, vpls[numbers[i]], VISIBILITY(i));
+
+void add_vpl(inout Reflected r, Pixel p, Vpl vpl, float visibility) {
+    vec3 arriving = vpl_irradiance(vpl, p.position, p.normal, p.shading_normal) * visibility;
+#if GLOSSY
+    reflect_light(r, p, arriving, -way_from(vpl, p.position), vpl_spread);
+#else
+    r.irradiance += arriving;
+#endif
+}
+#endif
+
 void main() {
     if (texelFetch(primitives, ivec2(gl_FragCoord.xy), 0).r != uint(face_number() + 1)) discard;
     Surface s = surface();
@@ -62,18 +81,29 @@ void main() {
     r.irradiance = arriving;
 #endif
 #else
-    for (int i = 0; i < LIGHTS_PER_DRAW; ++i) {
-        if (i >= count) break;
-        vec3 arriving = vpl_irradiance(vpls[numbers[i]], s.position, s.normal, s.shading_normal);
-#if HAS_VPL_MAPS
-        arriving *= vpl_visibility(vpl_maps[i], vpls[numbers[i]], s.position, s.normal);
+    // One by one: a map by a number that is no constant makes llvmpipe (Mesa 22.3) take an array texture for one, and crash.
+    ADD_VPL(0)
+#if LIGHTS_PER_DRAW > 1
+    ADD_VPL(1)
 #endif
-#if GLOSSY
-        reflect_light(r, p, arriving, -way_from(vpls[numbers[i]], s.position), vpl_spread);
-#else
-        r.irradiance += arriving;
+#if LIGHTS_PER_DRAW > 2
+    ADD_VPL(2)
 #endif
-    }
+#if LIGHTS_PER_DRAW > 3
+    ADD_VPL(3)
+#endif
+#if LIGHTS_PER_DRAW > 4
+    ADD_VPL(4)
+#endif
+#if LIGHTS_PER_DRAW > 5
+    ADD_VPL(5)
+#endif
+#if LIGHTS_PER_DRAW > 6
+    ADD_VPL(6)
+#endif
+#if LIGHTS_PER_DRAW > 7
+    ADD_VPL(7)
+#endif
 #endif
     radiance = vec4(reflected_radiance(r, color), 1.0);
     WRITE_DEPTH(frame.near);

@@ -141,7 +141,7 @@ def test_an_interrupt_ends_with_one_line_and_no_file(tmp_path, capsys, monkeypat
         begun.append(1)
         if len(begun) == 3:
             raise KeyboardInterrupt
-        return np.zeros((len(surfaces.face), 3)), np.zeros((len(surfaces.face), 3))
+        return np.zeros((len(surfaces.hits.face), 3)), np.zeros((len(surfaces.hits.face), 3))
 
     monkeypatch.setattr(PathTracer, "_follow_bounces", interrupted)
     monkeypatch.setattr("deferred_ir.truth.path_tracer.RAYS", 256)

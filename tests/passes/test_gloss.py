@@ -86,6 +86,18 @@ def test_direct_light_is_reflected_as_the_brdf_says(renderer, name):
     assert (off > 0.02).mean() < 0.03  # borders of shadows
 
 
+@pytest.mark.parametrize("lights", [2, 4, 8])
+def test_several_vpls_a_draw_are_the_same_on_textures(renderer, lights):
+    """Beside array textures, a driver must not be asked for a map by a number that is no constant."""
+    scene = mapped_plane()
+    scene = replace(scene, materials=(replace(scene.materials[0], metallic=0.0, specular=0.0),))
+    one, many = (
+        renderer(SIZE, "forward", set={"forward.lights_per_draw": count}).render(scene, vpls=10).radiance
+        for count in (1, lights)
+    )
+    np.testing.assert_allclose(many, one, rtol=1e-5, atol=1e-7)
+
+
 def test_matt_numbers_are_lambert(renderer):
     """A scene drawn by the glossy shaders, whose surfaces have no gloss left, is the matt one."""
     scene = room()

@@ -12,7 +12,7 @@ import numpy as np
 from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.frame.uploads.cluster_buffers import ClusterBuffers
 from deferred_ir.frame.uploads.coverage import list_cut_faces, make_cut_mesh, pack_coverage, place_corners
-from deferred_ir.frame.uploads.material_tables import describe_materials, pack_materials
+from deferred_ir.frame.uploads.material_records import describe_materials, pack_materials
 from deferred_ir.frame.uploads.scene_textures import SceneTextures
 from deferred_ir.gl.context import Gpu
 from deferred_ir.gl.shaders import Program

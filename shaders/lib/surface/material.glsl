@@ -1,4 +1,4 @@
-// Numbers of materials (deferred_ir/frame/uploads/material_tables.py), and the gloss that follows from them.
+// Numbers of materials (deferred_ir/frame/uploads/material_records.py), and the gloss that follows from them.
 #include "lib/surface/brdf.glsl"
 
 struct MaterialNumbers {

@@ -31,8 +31,8 @@ MOST_BATCHES = 16
 RAYS = 1 << 13
 """Rays of a task: few enough for their arrays to stay in a core's cache."""
 
-MOST_REFLECTIONS = 8
-"""Most glossy reflections that the camera sees one in another; further ones are black."""
+MOST_REFLECTIONS = 32
+"""Most glossy reflections that the camera sees one in another; further ones are black. White metals alone need many."""
 ROULETTE = 0.25
 """Paths by reflections that weigh less go on by chance, and then weigh this much."""
 

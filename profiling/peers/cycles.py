@@ -22,6 +22,7 @@ from deferred_ir.base.arrays import Array
 from deferred_ir.output.image import read_radiance
 from deferred_ir.profiling.peers.peer import Rendered
 from deferred_ir.scene.scene import Scene
+from deferred_ir.truth.path_tracer import MOST_REFLECTIONS
 
 INSTALL = "bpy"
 
@@ -49,7 +50,7 @@ class Peer:
             self._bpy: Any = bpy
             bpy.ops.wm.read_factory_settings(use_empty=True)
             cycles_scene.build(bpy, scene.at(0.0))
-            _set_up(bpy.context.scene, size, bounces)
+            _set_up(bpy.context.scene, size, bounces, MOST_REFLECTIONS if scene.has_gloss else 0)
         self.about = f"Cycles of Blender {bpy.app.version_string}, CPU"
         self.render(1, 0)  # builds its BVH and the denoiser's network
 
@@ -77,8 +78,11 @@ class Peer:
             return read_radiance(path).astype(np.float32)
 
 
-def _set_up(view: Any, size: tuple[int, int], bounces: int) -> None:
-    """Set direct light and `bounces` diffuse bounces, a box filter over the pixel, and no clamping or early ends."""
+def _set_up(view: Any, size: tuple[int, int], bounces: int, reflections: int) -> None:
+    """Set direct light, `bounces` diffuse bounces, glossy reflections, but none after a diffuse bounce (caustics).
+
+    And a box filter over the pixel, and no clamping or early ends.
+    """
     render, cycles = view.render, view.cycles
     render.engine = "CYCLES"
     render.resolution_x, render.resolution_y = size
@@ -94,8 +98,9 @@ def _set_up(view: Any, size: tuple[int, int], bounces: int) -> None:
     view.view_settings.view_transform = "Raw"
 
     cycles.device = "CPU"
-    cycles.max_bounces = cycles.diffuse_bounces = bounces
-    cycles.glossy_bounces = cycles.transmission_bounces = cycles.volume_bounces = 0
+    cycles.diffuse_bounces, cycles.glossy_bounces = bounces, reflections
+    cycles.max_bounces = bounces + reflections
+    cycles.transmission_bounces = cycles.volume_bounces = 0
     cycles.caustics_reflective = cycles.caustics_refractive = False
     cycles.use_fast_gi = cycles.use_guiding = False
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0

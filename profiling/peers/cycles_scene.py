@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from deferred_ir.base.arrays import Array, Vec3
-from deferred_ir.base.colour import srgb_table
 from deferred_ir.profiling.peers.cycles_lights import convert_lights
 from deferred_ir.profiling.peers.cycles_nodes import Nodes, make_matrix
+from deferred_ir.profiling.peers.peer import check_materials, decode, find_numbers
 from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.geometry import Geometry
 from deferred_ir.scene.scene import Scene
-from deferred_ir.scene.surfaces.materials import Material, Texture, TextureRef
+from deferred_ir.scene.surfaces.materials import WHITE, Material, TextureRef
 
 FARTHEST = 10.0
 """Far plane, in distances from the camera to the farthest corner of the scene."""
@@ -23,10 +23,11 @@ FARTHEST = 10.0
 def build(bpy: Any, scene: Scene) -> None:
     """Fill Blender's empty scene. Its axes are used as ours, since nothing depends on which way is up."""
     link = bpy.context.scene.collection.objects.link
-    images = [_image(bpy, texture) for texture in scene.textures]
+    check_materials("cycles", scene)
+    images = [_image(bpy, texture.name, decode(texture)) for texture in scene.textures]
     mesh = _mesh(bpy, scene.geometry)
     for material in scene.materials:
-        mesh.materials.append(_material(bpy, material, images, scene.geometry.colors is not None))
+        mesh.materials.append(_material(bpy, scene, material, images))
     body = bpy.data.objects.new("scene", mesh)
     # By default Blender lifts shadow rays off smooth surfaces, against visible facets.
     body.shadow_terminator_geometry_offset = body.shadow_terminator_shading_offset = 0
@@ -76,29 +77,27 @@ def _attribute(mesh: Any, name: str, kind: str, domain: str, values: Array) -> N
     attribute.data.foreach_set("color" if kind == "FLOAT_COLOR" else "vector", values.astype(np.float32).ravel())
 
 
-def _image(bpy: Any, texture: Texture) -> Any:
-    """Build an image of linear floats: Cycles would decode sRGB after filtering, and we decode before."""
-    height, width = texture.pixels.shape[:2]
-    image = bpy.data.images.new(texture.name, width, height, alpha=False, float_buffer=True, is_data=True)
+def _image(bpy: Any, name: str, linear: Array) -> Any:
+    """Build an image of linear floats (H, W, 3): Cycles would decode sRGB after filtering, and we decode before."""
+    height, width = linear.shape[:2]
+    image = bpy.data.images.new(name, width, height, alpha=False, float_buffer=True, is_data=True)
     pixels = np.ones((height, width, 4), np.float32)
-    pixels[..., :3] = srgb_table()[texture.pixels[::-1, :, :3]]
+    pixels[..., :3] = linear[::-1]
     image.pixels.foreach_set(pixels.ravel())
     return image
 
 
-def _material(bpy: Any, material: Material, images: Sequence[Any], colored: bool) -> Any:
-    """Build a diffuse material with reflectance = albedo * texture * vertex colour, which may emit."""
+def _material(bpy: Any, scene: Scene, material: Material, images: Sequence[Any]) -> Any:
+    """Build a material with reflectance = base colour * texture * vertex colour, which may emit."""
     result = bpy.data.materials.new(material.name)
     result.use_nodes = True
     nodes = Nodes(result.node_tree)
-    diffuse = nodes.add("ShaderNodeBsdfDiffuse", Roughness=0.0)
     reflectance = _textured(nodes, material.base_color, _find_image(material.base_color_texture, images))
-    if colored:
+    if scene.geometry.colors is not None:
         color = nodes.add("ShaderNodeAttribute")
         color.attribute_name = "tint"
         reflectance = nodes.vector("MULTIPLY", reflectance, color.outputs["Color"])
-    nodes.join(reflectance, diffuse.inputs["Color"])
-    surface = diffuse.outputs["BSDF"]
+    surface = _glossy(bpy, nodes, scene, material, reflectance) if material.is_glossy else _matt(nodes, reflectance)
     if any(material.emission):
         radiance = _textured(nodes, material.emission, _find_image(material.emission_texture, images))
         emission = nodes.add("ShaderNodeEmission", Color=radiance)
@@ -112,6 +111,36 @@ def _material(bpy: Any, material: Material, images: Sequence[Any], colored: bool
         result.cycles.emission_sampling = "FRONT_BACK" if material.emits_both_sides else "FRONT"
     nodes.join(surface, nodes.add("ShaderNodeOutputMaterial").inputs["Surface"])
     return result
+
+
+def _matt(nodes: Nodes, reflectance: Any) -> Any:
+    return nodes.add("ShaderNodeBsdfDiffuse", Roughness=0.0, Color=reflectance).outputs["BSDF"]
+
+
+def _glossy(bpy: Any, nodes: Nodes, scene: Scene, material: Material, color: Any) -> Any:
+    """Add Blender's principled BSDF, with light that facets scatter once, as ours.
+
+    A metal differs by its shadowing, which goes with the heights of facets for both directions together. Under a coat,
+    what the coat reflects on average is taken from the diffuse part, and the coat has a dielectric's exact Fresnel
+    term.
+    """
+    principled = nodes.add("ShaderNodeBsdfPrincipled")
+    principled.distribution = "GGX"
+    inputs = principled.inputs
+    nodes.join(color, inputs["Base Color"])
+    nodes.join(float(max(material.ior, 1.0)), inputs["IOR"])
+    nodes.join(material.specular / 2, inputs["Specular IOR Level"])
+    nodes.join((*material.specular_color, 1.0), inputs["Specular Tint"])
+    numbers = (("Roughness", material.roughness), ("Metallic", material.metallic))
+    image = find_numbers(scene, material)
+    parts: tuple[Any, ...] = (None, None)
+    if image is not None:
+        pixels = np.concatenate([image, np.ones((*image.shape[:2], 1), np.float32)], axis=2)
+        split = nodes.add("ShaderNodeSeparateXYZ", Vector=_textured(nodes, WHITE, _image(bpy, material.name, pixels)))
+        parts = split.outputs[0], split.outputs[1]
+    for (name, factor), part in zip(numbers, parts, strict=True):
+        nodes.join(factor if part is None else nodes.math(part, factor, 0.0), inputs[name])
+    return principled.outputs["BSDF"]
 
 
 def _find_image(texture: TextureRef | None, images: Sequence[Any]) -> Any:

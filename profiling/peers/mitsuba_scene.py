@@ -1,4 +1,7 @@
-"""Conversion of a scene to the dictionary from which Mitsuba loads its own; `mitsuba_lights` converts the lights."""
+"""Conversion of a scene to the dictionary from which Mitsuba loads its own.
+
+`mitsuba_lights` converts the lights and `mitsuba_materials` the materials.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from deferred_ir.base.arrays import Array, Bools, Ints
-from deferred_ir.base.colour import srgb_table
+from deferred_ir.base.arrays import Bools, Ints
 from deferred_ir.base.errors import SettingError
 from deferred_ir.frame.frame import NEAR
-from deferred_ir.profiling.peers.mitsuba_lights import convert_lights, make_bitmap
+from deferred_ir.profiling.peers.mitsuba_lights import convert_lights
+from deferred_ir.profiling.peers.mitsuba_materials import describe_image, describe_material
+from deferred_ir.profiling.peers.peer import check_materials
 from deferred_ir.scene.scene import Scene
-from deferred_ir.scene.surfaces.materials import Material, TextureRef
+from deferred_ir.truth.path_tracer import MOST_REFLECTIONS
 
 SAMPLER = "multijitter"
 FAR = 1e3
@@ -23,6 +27,7 @@ APART = 1e-5
 
 def describe(mi: Any, scene: Scene, size: tuple[int, int], bounces: int) -> dict[str, Any]:
     """Return the input of `mitsuba.load_dict`. mi: mitsuba with a variant set. Raises SettingError for other scenes."""
+    check_materials("mitsuba", scene)
     shapes = {
         f"mesh_{number}_{smooth}": _mesh(mi, scene, number, faces, smooth=smooth)
         for number in range(len(scene.materials))
@@ -33,8 +38,9 @@ def describe(mi: Any, scene: Scene, size: tuple[int, int], bounces: int) -> dict
         for number, material in enumerate(scene.materials)
         if material.emits_both_sides and any(material.emission) and (scene.geometry.face_materials == number).any()
     }
-    # A path of `bounces` has a segment to the camera, one for each bounce, and one to the light.
-    integrator = {"type": "path", "max_depth": bounces + 2}
+    # A path of `bounces` has a segment to the camera, one for each bounce, and one to the light. Reflections are more
+    # of them: Mitsuba does not tell them from bounces, so where both are there it shows more of both, and caustics.
+    integrator = {"type": "path", "max_depth": bounces + 2 + (MOST_REFLECTIONS if scene.has_gloss else 0)}
     sensor = _sensor(mi, scene, size)
     return {"type": "scene", "integrator": integrator, "sensor": sensor, **convert_lights(mi, scene), **shapes}
 
@@ -82,8 +88,7 @@ def _mesh(mi: Any, scene: Scene, number: int, faces: Ints, *, smooth: bool = Fal
     else:
         used, corners = np.unique(geometry.faces[faces], return_inverse=True)
         behind = np.zeros((len(used), 3))
-    images = material.base_color_texture, material.emission_texture
-    textured = images != (None, None) and geometry.uvs is not None
+    textured = any(material.textures.values()) and geometry.uvs is not None
     colors = None if geometry.colors is None else geometry.colors[used]
     if colors is not None and (colors == colors[0]).all():
         albedo, colors = np.multiply(material.base_color, colors[0]), None
@@ -94,14 +99,9 @@ def _mesh(mi: Any, scene: Scene, number: int, faces: Ints, *, smooth: bool = Fal
             f"mitsuba: cannot multiply the vertex colours of '{material.name}' by its image texture, as this scene does"
         )
     properties = mi.Properties()
-    properties["bsdf"] = mi.load_dict(
-        {
-            "type": "twosided",
-            "bsdf": {"type": "diffuse", "reflectance": _reflectance(mi, scene, material, albedo, colors)},
-        }
-    )
+    properties["bsdf"] = mi.load_dict(describe_material(mi, scene, material, albedo, colors))
     if any(material.emission):
-        radiance = _textured(mi, scene, material.emission_texture, np.asarray(material.emission))
+        radiance = describe_image(mi, scene, material.emission_texture, np.asarray(material.emission))
         properties["emitter"] = mi.load_dict({"type": "area", "radiance": radiance})
     mesh = mi.Mesh(
         material.name,
@@ -124,17 +124,3 @@ def _mesh(mi: Any, scene: Scene, number: int, faces: Ints, *, smooth: bool = Fal
         parameters[name] = np.ravel(array).astype(kind)
     parameters.update()
     return mesh
-
-
-def _reflectance(mi: Any, scene: Scene, material: Material, albedo: Array, colors: Array | None) -> dict[str, Any]:
-    if colors is not None:
-        return {"type": "mesh_attribute", "name": "vertex_color"}
-    return _textured(mi, scene, material.base_color_texture, albedo)
-
-
-def _textured(mi: Any, scene: Scene, image: TextureRef | None, factor: Array) -> dict[str, Any]:
-    """Return `factor` (3,) times a texture of the scene, if there is one."""
-    if image is None or scene.geometry.uvs is None:
-        return {"type": "rgb", "value": factor.tolist()}
-    # Linear before filtering, as ours; the filter is linear, so the factor can be in its pixels.
-    return make_bitmap(mi, srgb_table()[scene.textures[image.number].pixels[..., :3]] * factor.astype(np.float32))

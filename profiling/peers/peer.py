@@ -9,8 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from deferred_ir.base.arrays import Array
+from deferred_ir.base.colour import linear_from_srgb
+from deferred_ir.base.errors import SettingError
 from deferred_ir.scene.scene import Scene
+from deferred_ir.scene.surfaces.materials import Material, Texture, TextureRef
 
 NAMES = ("mitsuba", "cycles")
 """The modules of this package that are peers, in the order of the tables."""
@@ -51,3 +56,41 @@ class Module(Protocol):
 
     def available(self) -> str | None:
         """Return None if the peer can be used here, else the reason why not."""
+
+
+def check_materials(name: str, scene: Scene) -> None:
+    """Raise SettingError for materials that the peer `name` cannot render as ours are."""
+    for material in scene.materials:
+        faults = {
+            "a normal map": material.normal_texture is not None,
+            "holes": material.is_cut,
+            "unlit emission": material.unlit and material.emits,
+            "images that are moved, mirrored, cut off at their edge or not filtered": any(
+                image is not None and not _is_plain(image) for image in material.textures.values()
+            ),
+        }
+        for what, there in faults.items():
+            if there:
+                raise SettingError(f"{name}: does not render {what}, as '{material.name}' has; leave it out by --peers")
+
+
+def _is_plain(image: TextureRef) -> bool:
+    """Return whether a texture is read at the first coordinates, repeated and filtered."""
+    plain, sampler = TextureRef(image.number), image.sampler
+    moved = (image.uv_set, image.transform) != (plain.uv_set, plain.transform)
+    return not moved and sampler.wrap == plain.sampler.wrap and sampler.magnify == plain.sampler.magnify
+
+
+def decode(texture: Texture) -> Array:
+    """Return a colour texture as linear RGB, float32 (H, W, 3)."""
+    return linear_from_srgb(texture.pixels[..., :3] / np.iinfo(texture.pixels.dtype).max).astype(np.float32)
+
+
+def find_numbers(scene: Scene, material: Material) -> Array | None:
+    """Return the roughness and metallic that a material's texture says, float32 (H, W, 2), if it has one."""
+    image = material.metallic_roughness_texture
+    if image is None or scene.geometry.uvs is None:
+        return None
+    pixels = scene.textures[image.number].pixels
+    numbers: Array = (pixels[..., 1:3] / np.iinfo(pixels.dtype).max).astype(np.float32)
+    return numbers

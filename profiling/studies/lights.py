@@ -2,11 +2,13 @@
 
     python -m deferred_ir.profiling.studies.lights --kinds point,mixture --size 256x256
     python -m deferred_ir.profiling.studies.lights --without-mitsuba --graphs accurate,deferred
+    python -m deferred_ir.profiling.studies.lights --kinds "white metal 0.1,copper 0.2" --size 128x128
 
-The scenes are those of light_scenes.py. Mitsuba's pixels are means over their area, so that ours are jittered here as
-well. Blocks of 8x8 pixels agree if their means differ by no more than three standard errors (of both) in each channel;
-the errors come from the spread over `--seeds` images with `--spp` paths a pixel in all. Mitsuba's pattern of samples is
-darker by 0.1 % under the grey sky where an image has only 4 or 8 paths a pixel, and is not with 64.
+The scenes are those of light_scenes.py, and on request those of material_scenes.py. Mitsuba's pixels are means over
+their area, so that ours are jittered here as well. Blocks of 8x8 pixels agree if their means differ by no more than
+three standard errors (of both) in each channel; the errors come from the spread over `--seeds` images with `--spp`
+paths a pixel in all. Mitsuba's pattern of samples is darker by 0.1 % under the grey sky where an image has only 4 or 8
+paths a pixel, and is not with 64.
 """
 
 from __future__ import annotations
@@ -21,9 +23,9 @@ from deferred_ir.base.arrays import Array
 from deferred_ir.base.errors import SettingError, did_you_mean
 from deferred_ir.base.progress import track
 from deferred_ir.engine.renderer import Renderer
+from deferred_ir.profiling import light_scenes, material_scenes
 from deferred_ir.profiling.checks.agreement import average_blocks
 from deferred_ir.profiling.figures import markdown
-from deferred_ir.profiling.light_scenes import SCENES
 from deferred_ir.profiling.peers import mitsuba
 from deferred_ir.profiling.study import command_line, run
 from deferred_ir.scene.camera import Camera
@@ -31,6 +33,7 @@ from deferred_ir.scene.scene import Scene
 from deferred_ir.truth.metrics import relmse
 from deferred_ir.truth.reference import Reference, trace_reference
 
+SCENES = {**light_scenes.SCENES, **material_scenes.SCENES}
 WITHIN = 3.0
 """Standard errors."""
 ROUNDING = 1e-5
@@ -79,10 +82,10 @@ def compare(ours: Sequence[Array], theirs: Sequence[Array]) -> Agreement:
     )
 
 
-def compare_with_mitsuba(scene: Scene, size: tuple[int, int], spp: int, seeds: int) -> Agreement:
+def compare_with_mitsuba(scene: Scene, size: tuple[int, int], spp: int, seeds: int, bounces: int = 1) -> Agreement:
     """Render `seeds` images of a scene each way, spp / seeds paths a pixel each, and compare them."""
     each = max(1, spp // seeds)
-    peer = mitsuba.Peer(scene, size, 1)
+    peer = mitsuba.Peer(scene, size, bounces)
     theirs = [peer.render(each, seed).radiance for seed in track(range(seeds), f"{scene.name}, Mitsuba")]
     camera = scene.camera
     ours = [
@@ -90,6 +93,7 @@ def compare_with_mitsuba(scene: Scene, size: tuple[int, int], spp: int, seeds: i
             replace(scene, camera=JitteredCamera(camera.position, camera.look_at, camera.up, camera.fov, seed=seed)),
             size,
             spp=each,
+            bounces=bounces,
             seed=seed,
         ).radiance
         for seed in track(range(seeds), f"{scene.name}, paths")
@@ -130,7 +134,7 @@ def report(chosen: argparse.Namespace) -> None:
         scene = SCENES[name]()
         row = [name]
         if not chosen.without_mitsuba:
-            found = compare_with_mitsuba(scene, chosen.size, chosen.spp, chosen.seeds)
+            found = compare_with_mitsuba(scene, chosen.size, chosen.spp, chosen.seeds, chosen.bounces)
             row += [f"{found.within:.1%}", f"{found.ratio:.4f}", f"{found.error:.2%}"]
         if graphs:
             truth = trace_reference(scene, chosen.size, spp=chosen.spp)
@@ -147,7 +151,9 @@ def main(words: Sequence[str] | None = None) -> None:
     """Run the study; sizes have to be multiples of 8."""
     parser = command_line(__doc__, scenes=False, size=(256, 256), spp=256, seeds=32, vpls=1024, graphs=["none"])
     names: Callable[[str], list[str]] = lambda text: text.split(",")  # noqa: E731
-    parser.add_argument("--kinds", type=names, default=list(SCENES), metavar="A,B", help="scenes; all without it")
+    lights = list(light_scenes.SCENES)
+    parser.add_argument("--kinds", type=names, default=lights, metavar="A,B", help="scenes; those of lights without it")
+    parser.add_argument("--bounces", type=int, default=1, help="beside Mitsuba; default 1")
     parser.add_argument("--without-mitsuba", action="store_true", help="compare graphs with the path tracer only")
     run(parser, report, words)
 

@@ -27,4 +27,5 @@ def test_graph_and_its_errors_need_no_gl():
 
 def test_scenes_lists_the_built_in_ones(capsys):
     assert main(["scenes"]) == 0
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["atrium", "colors", "cornell"]
+    listed = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert listed == ["atrium", "colors", "cornell", "gallery"]

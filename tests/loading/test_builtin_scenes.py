@@ -7,9 +7,9 @@ from PIL import Image
 from deferred_ir.loading.load import builtin_scenes, load
 from deferred_ir.rays.tracer import Tracer
 from deferred_ir.scene.scene import Scene
-from deferred_ir.scenes import atrium, colors
+from deferred_ir.scenes import atrium, colors, gallery
 
-NAMES = ("atrium", "colors", "cornell")
+NAMES = ("atrium", "colors", "cornell", "gallery")
 SIZE = (64, 64)
 
 
@@ -170,8 +170,8 @@ def test_arcades_of_the_atrium_are_lit_indirectly_only():
     assert light.max() == 0
 
 
-def test_built_in_scenes_are_matt(scene: Scene):
-    assert not scene.has_gloss
+def test_built_in_scenes_are_matt_but_for_the_gallery(scene: Scene):
+    assert scene.has_gloss == (scene.name == "gallery")
     assert not scene.has_cutouts
 
 
@@ -192,6 +192,43 @@ def test_script_makes_the_committed_atrium(tmp_path):
     # Sines differ in their last bits from one C library to another.
     np.testing.assert_allclose(new.geometry.positions, old.geometry.positions, atol=1e-5)
     np.testing.assert_allclose(new.geometry.normals, old.geometry.normals, atol=1e-5)
+
+
+def test_gallery_has_two_rows_of_balls_from_smooth_to_rough():
+    scene = load("gallery")
+    face = first_hits(scene).face.reshape(SIZE)
+    rows = {}
+    for material in scene.materials:
+        kind, _, roughness = material.name.partition(" ")
+        if roughness:
+            number = scene.materials.index(material)
+            height, across = np.nonzero(scene.geometry.face_materials[face] == number)
+            rows.setdefault(kind, []).append((float(roughness), across.mean(), height.mean()))
+            assert (scene.geometry.face_materials == number).sum() <= 2500
+            assert material.roughness == float(roughness)
+            assert (material.metallic, material.specular) == (float(kind == "gold"), 1.0)
+        else:
+            assert not material.is_glossy
+    assert {kind: len(balls) for kind, balls in rows.items()} == {"gold": 6, "plastic": 6}
+    for balls in rows.values():
+        order = np.array(sorted(balls))
+        assert (np.diff(order[:, 1]) > 3).all()
+    assert np.mean(rows["gold"], axis=0)[2] < np.mean(rows["plastic"], axis=0)[2] - 5
+    assert sum(material.emits for material in scene.materials) == 1
+
+
+def test_script_makes_the_committed_gallery(tmp_path):
+    made = tmp_path / "gallery.glb"
+    gallery.write(made)
+    new, old = load(made), load("gallery")
+    assert new.materials == old.materials
+    np.testing.assert_array_equal(new.textures[0].pixels, old.textures[0].pixels)
+    np.testing.assert_array_equal(new.textures[0].pixels, gallery.paint_tiles())
+    np.testing.assert_array_equal(new.geometry.faces, old.geometry.faces)
+    # Sines differ in their last bits from one C library to another.
+    np.testing.assert_allclose(new.geometry.positions, old.geometry.positions, atol=1e-5)
+    np.testing.assert_allclose(new.geometry.normals, old.geometry.normals, atol=1e-5)
+    assert old.path.with_name("gallery.glb").stat().st_size < 100_000
 
 
 def test_script_makes_the_committed_colors(tmp_path):

@@ -10,6 +10,7 @@ from deferred_ir.scene.camera import Camera
 from deferred_ir.scene.lights.kinds import find_kinds
 
 light_scenes = import_module("deferred_ir.profiling.light_scenes")
+material_scenes = import_module("deferred_ir.profiling.material_scenes")
 study = import_module("deferred_ir.profiling.studies.lights")
 
 
@@ -72,3 +73,14 @@ def _rays(camera):
 def test_an_unknown_scene_is_one_line():
     with pytest.raises(SystemExit, match=r"^--kinds: no scene 'ponit'; did you mean 'point'"):
         study.main(["--kinds", "ponit"])
+
+
+def test_scenes_of_materials_are_of_one_material_and_what_shines():
+    for name, make in material_scenes.SCENES.items():
+        scene = make()
+        assert scene.has_gloss
+        assert scene.emits
+        if "metal" in name:
+            assert all(material.metallic == 1 or any(material.emission) for material in scene.materials)
+    room = material_scenes.build_mixed_room()
+    assert {material.metallic for material in room.materials} == {0.0, 1.0}

@@ -146,7 +146,8 @@ def build() -> Document:
         )
 
     texture = document.add("textures", source=_add_image(document, paint_tiles()), sampler=0)
-    document.add("samplers", magFilter=9729, minFilter=9987, wrapS=10497, wrapT=10497)
+    # Without mipmaps: the reference, whose rays have no width, can be compared pixel by pixel.
+    document.add("samplers", magFilter=9729, minFilter=9729, wrapS=10497, wrapT=10497)
     materials = {
         "floor": add_material(
             "floor", (1.0, 1.0, 1.0), extensions=matt, reflection={"baseColorTexture": {"index": texture}}

@@ -127,9 +127,11 @@ class PathTracer:
             at = Receivers.make(surfaces, directions[chosen], show_gloss=True)
             direct = self._lighting.sample_well(at, counts[batch], rng).leave(surfaces.albedo)
             met, indirect = self._follow_bounces(at, counts[batch], rng)
-            if at.shows_gloss:
-                shone, reflected = self._follow_reflections(at, counts[batch], rng)
-                return direct + met + shone, indirect + reflected
+            rows = at.find_shiny()
+            if len(rows):
+                shone, reflected = self._follow_reflections(at.rows(rows), counts[batch], rng)
+                direct[rows] += shone
+                indirect[rows] += reflected
             return direct + met, indirect
 
         direct, indirect, mean, squares = (np.zeros((len(seen.face), 3)) for _ in range(4))

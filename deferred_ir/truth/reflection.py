@@ -44,6 +44,13 @@ class Receivers:
         seen = None if self.to_viewer is None else self.to_viewer[chosen]
         return Receivers(self.hits.rows(chosen), seen, self.shows_gloss)
 
+    def find_shiny(self) -> Ints:
+        """Return the rows of those that show gloss and have some."""
+        if not self.shows_gloss:
+            return np.zeros(0, int)
+        gloss, _ = self._known
+        return np.flatnonzero(gloss.f0.any(axis=1) | (gloss.f90 > 0))
+
     @property
     def _known(self) -> tuple[Gloss, Array]:
         """What is known where there is gloss."""

@@ -102,6 +102,7 @@ def _set_up(view: Any, size: tuple[int, int], bounces: int, reflections: int) ->
     cycles.max_bounces = bounces + reflections
     cycles.transmission_bounces = cycles.volume_bounces = 0
     cycles.caustics_reflective = cycles.caustics_refractive = False
+    cycles.blur_glossy = 0
     cycles.use_fast_gi = cycles.use_guiding = False
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
     cycles.light_sampling_threshold = 0

@@ -13,13 +13,17 @@ from dataclasses import replace
 from importlib import import_module
 
 import fake_peer
+import numpy as np
 import pytest
 from small_scenes import room
+from surface_scenes import mapped_plane
 
 from deferred_ir.base.errors import SettingError
 from deferred_ir.cli.main import main
 from deferred_ir.report.origin import Origin
 from deferred_ir.scene.lights.environment import Environment
+from deferred_ir.scene.surfaces.materials import Sampler, Texture, TextureRef
+from deferred_ir.scene.surfaces.texture_lookup import sample_texture
 from deferred_ir.truth.reference_noise import ReferenceNoise
 
 ladder = import_module("deferred_ir.profiling.peers.ladder")
@@ -70,6 +74,41 @@ def fake(monkeypatch):
     monkeypatch.setattr(ladder, "ENOUGH", 0.0)
     monkeypatch.setattr(ladder, "MOST_SPP", 1 << (RUNGS - 1))
     return state
+
+
+PLAIN = TextureRef(0)
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        ({"normal_texture": PLAIN}, "a normal map"),
+        ({"alpha_cutoff": 0.5}, "holes"),
+        ({"unlit": True, "emission": (1.0, 1.0, 1.0)}, "unlit emission"),
+        ({"base_color_texture": TextureRef(0, uv_set=1)}, "images that are moved"),
+        ({"metallic_roughness_texture": TextureRef(0, sampler=Sampler(magnify="nearest"))}, "or not filtered"),
+    ],
+)
+def test_what_a_peer_cannot_render_as_authored_is_named(change, what):
+    scene = room()
+    peers.check_materials("mitsuba", scene)
+    changed = replace(scene, materials=(scene.materials[0], replace(scene.materials[1], **change)))
+    with pytest.raises(SettingError, match=f"^mitsuba: does not render .*{what}.* 'material 1' has"):
+        peers.check_materials("mitsuba", changed)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_peers_read_images_as_we_do(dtype):
+    scene, rng = mapped_plane(), np.random.default_rng(2)
+    pixels = rng.integers(0, np.iinfo(dtype).max + 1, (4, 4, 3)).astype(dtype)
+    image = Texture("image", pixels)
+    x, y = np.meshgrid((np.arange(4) + 0.5) / 4, 1 - (np.arange(4) + 0.5) / 4)
+    uvs = np.stack([x, y], axis=-1).reshape(-1, 2)
+    np.testing.assert_allclose(peers.decode(image).reshape(-1, 3), sample_texture(image, uvs), atol=1e-6)
+    scene = replace(scene, textures=(image, image))
+    found = peers.find_numbers(scene, scene.materials[0])
+    np.testing.assert_allclose(found.reshape(-1, 2), sample_texture(image, uvs, color=False)[:, 1:], atol=1e-6)
+    assert peers.find_numbers(scene, replace(scene.materials[0], metallic_roughness_texture=None)) is None
 
 
 def profile(folder, *extra):

@@ -155,3 +155,19 @@ def test_directions_are_drawn_with_the_stated_density(rough, up):
     freedom = enough.sum()
     assert chi < freedom + 6 * np.sqrt(2 * freedom)
     assert enough.sum() > 20
+
+
+def test_samples_are_right_where_the_viewer_is_below_the_shading_normal():
+    """So a normal map may turn a surface; draws and their density agree with the BRDF there, too."""
+    rng, count = np.random.default_rng(1), 200_000
+    gloss = brdf.Gloss(np.full((count, 3), 0.5), np.ones(count), np.zeros((count, 2)), np.full(count, 0.3))
+    normal = np.tile([0.0, 0.0, 1.0], (count, 1))
+    viewer = np.tile([np.sqrt(1 - 0.04), 0.0, -0.2], (count, 1))
+    ways, weights = brdf.sample(gloss, normal, viewer, rng.random((count, 2)))
+    height, angle = rng.random(count), 2 * np.pi * rng.random(count)
+    ring = np.sqrt(1 - height**2)
+    even = np.stack([ring * np.cos(angle), ring * np.sin(angle), height], axis=1)
+    _, glossy = brdf.eval(gloss, normal, viewer, even)
+    assert weights[:, 0].mean() == pytest.approx((glossy[:, 0] * height).mean() * 2 * np.pi, rel=0.02)
+    above = brdf.pdf(gloss, normal, viewer, even).mean() * 2 * np.pi
+    assert above + (ways[:, 2] <= 0).mean() == pytest.approx(1, abs=0.01)

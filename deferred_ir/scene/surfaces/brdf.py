@@ -103,8 +103,9 @@ def sample(gloss: Gloss, normal: Array, to_viewer: Array, points: Array) -> tupl
     2023). The second is 0 for directions below the surface.
     """
     right, up = build_basis(normal)
-    local = np.stack([_dot(to_viewer, axis) for axis in (right, up, normal)], axis=1)
-    local[:, 2] = np.maximum(np.abs(local[:, 2]), LEAST_COSINE)
+    viewer = _lift_viewer(normal, to_viewer)
+    local = np.stack([_dot(viewer, axis) for axis in (right, up, normal)], axis=1)
+    local[:, 2] = np.maximum(local[:, 2], LEAST_COSINE)
     widths = np.stack([gloss.alpha, gloss.alpha, np.ones(len(local))], axis=1)
     seen = _normalize(local * widths)
     height = (1 - points[:, 1]) * (1 + seen[:, 2]) - seen[:, 2]
@@ -115,13 +116,20 @@ def sample(gloss: Gloss, normal: Array, to_viewer: Array, points: Array) -> tupl
     way = 2 * cosine[:, None] * half - local
     lit = _mask(gloss.alpha, way[:, 2]) * (way[:, 2] > 0)
     weight = find_reflectance(gloss, (1 - np.clip(cosine, 0, 1)) ** 5) * lit[:, None]
-    return right * way[:, :1] + up * way[:, 1:2] + normal * way[:, 2:], weight
+    directions = right * way[:, :1] + up * way[:, 1:2] + normal * way[:, 2:]
+    below = np.flatnonzero(_dot(normal, to_viewer) < 0)
+    if len(below):
+        part = gloss.rows(below), normal[below], to_viewer[below], directions[below]
+        density = np.maximum(pdf(*part), np.finfo(float).tiny)
+        weight[below] = eval(*part)[1] * (np.maximum(way[below, 2], 0) / density)[:, None]
+    return directions, weight
 
 
 def pdf(gloss: Gloss, normal: Array, to_viewer: Array, to_light: Array) -> Array:
     """Return the density by solid angle, (n,), with which `sample` draws `to_light`; arguments as for `eval`."""
-    half = _normalize(to_viewer + to_light)
-    cosine = np.maximum(np.abs(_dot(normal, to_viewer)), LEAST_COSINE)
+    viewer = _lift_viewer(normal, to_viewer)
+    half = _normalize(viewer + to_light)
+    cosine = np.maximum(_dot(normal, viewer), LEAST_COSINE)
     density: Array = _distribute(gloss.alpha, normal, half) * _mask(gloss.alpha, cosine) / (4 * cosine)
     return np.where(_dot(normal, to_light) > 0, density, 0.0)
 
@@ -157,6 +165,12 @@ def _shadow(alpha: Array, normal: Array, to_viewer: Array, to_light: Array) -> A
         cosine = np.maximum(np.abs(_dot(normal, way)), LEAST_COSINE)
         result = result / (cosine + np.sqrt(alpha**2 + (1 - alpha**2) * cosine**2))
     return result
+
+
+def _lift_viewer(normal: Array, to_viewer: Array) -> Array:
+    """Return ways to the viewer, mirrored in the surface where they lie below its shading normal."""
+    lifted: Array = to_viewer - 2 * np.minimum(_dot(normal, to_viewer), 0)[:, None] * normal
+    return lifted
 
 
 def _weigh_grazing(to_viewer: Array, half: Array) -> Array:

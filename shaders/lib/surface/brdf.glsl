@@ -42,7 +42,8 @@ float mean_kept(Gloss gloss, float cosine) {
 // The glossy part of the BRDF, 1/sr. Vectors are unit. kept: what is left of the diffuse part. alpha: of the lobe, which
 // may be wider than the surface's own.
 vec3 glossy_brdf(Gloss gloss, float alpha, vec3 normal, vec3 to_viewer, vec3 to_light, out float kept) {
-    vec3 middle = normalize(to_viewer + to_light);
+    vec3 middle = to_viewer + to_light;
+    middle *= inversesqrt(max(dot(middle, middle), 1e-30));  // 0 where the light lies straight behind
     float x = weigh_grazing(dot(to_viewer, middle)), light = dot(normal, to_light);
     kept = 1.0 - mix(gloss.taken.x, gloss.taken.y, x);
     if (light <= 0.0) return vec3(0.0);

@@ -18,11 +18,11 @@ Reflected nothing_reflected() {
     return r;
 }
 
-// Adds light that arrives, as irradiance on the pixel, from `to`, of any length. spread: added to the square of the lobe's
+// Adds light that arrives, as irradiance on the pixel, from `to`, of any length. Nothing is skipped where it is dark: zink
+// (Mesa 22.3) crashes on a return here, inside a loop. spread: added to the square of the lobe's
 // width, for a point that stands for a source with an area.
 void reflect_light(inout Reflected r, Pixel p, vec3 arriving, vec3 to, float spread) {
 #if GLOSSY
-    if (arriving == vec3(0.0)) return;
     float kept, alpha = min(sqrt(p.gloss.alpha * p.gloss.alpha + spread), 1.0);
     vec3 direction = to * inversesqrt(max(dot(to, to), TINY));
     r.glossy += arriving * glossy_brdf(p.gloss, alpha, p.shading_normal, p.to_viewer, direction, kept);

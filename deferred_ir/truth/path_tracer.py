@@ -186,11 +186,11 @@ class PathTracer:
                 break
             landed = np.flatnonzero(found.hit)
             rows = up[landed]
-            start, normal = at.hits.position[rows], at.hits.normal[rows]
+            start = at.hits.position[rows]
             at = Receivers.make(found.rows(landed), directions[rows], show_gloss=False)
             paths, weight = paths[rows], weight[rows] * at.hits.albedo
             if bounce == 0:
-                weight *= self._attenuate_as_vpls(at.hits.position - start, normal)[:, None]
+                weight *= self._attenuate_as_vpls(start - at.hits.position, at.hits.normal)[:, None]
             total[paths] += weight / np.pi * self._lighting.sample(at, rng).irradiance
         return met.reshape(-1, count, 3).mean(axis=1), total.reshape(-1, count, 3).mean(axis=1)
 

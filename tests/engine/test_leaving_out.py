@@ -105,6 +105,8 @@ def test_without_vpls_nothing_is_cast_shared_or_filtered(renderer, graph):
         "environment",
         "gbuffer.emission",
         "gbuffer.material",
+        "reflection_rays",
+        "filter_reflections",
     }
 
 

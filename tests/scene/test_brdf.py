@@ -122,7 +122,7 @@ def test_what_is_drawn_weighs_brdf_times_cosine_over_density(rough, up, f0, seed
     np.testing.assert_allclose(np.linalg.norm(ways, axis=1), 1, atol=1e-3)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.floats(0.4, 1.0), st.floats(0.1, 1.0))
 def test_densities_and_what_falls_below_the_horizon_add_up_to_one(rough, up):
     count = 500

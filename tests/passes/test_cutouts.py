@@ -12,6 +12,8 @@ from surface_scenes import lattice
 from deferred_ir.engine.renderer import Renderer
 from deferred_ir.rays.direct import irradiate
 from deferred_ir.rays.tracer import Tracer
+from deferred_ir.scene.motion import ModelMotion
+from deferred_ir.scene.scene import Geometry, Model
 from deferred_ir.truth.path_tracer import PathTracer
 
 SIZE = (96, 96)
@@ -83,3 +85,21 @@ def test_less_alpha_than_the_threshold_takes_all_away(renderer):
     )
     first, second = (renderer(SIZE, "deferred").render(one, vpls=8).radiance for one in (gone, bare))
     np.testing.assert_allclose(first, second, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("graph", ["deferred", "forward", "hemisphere"])
+def test_holes_move_with_their_model(renderer, graph):
+    """The picture is that of the same triangles at rest where the motion has brought them."""
+    scene = lattice()
+    count = len(scene.geometry.positions)
+    motion = ModelMotion((0.0, 1.0), ((0, 0, 0), (0.1, 0.2, -0.1)), ((0, 0, 0, 1.0), (0, 0.2588, 0, 0.9659)))
+    model = Model("lattice", count - 4, 4, motion)
+    moving = replace(scene, geometry=replace(scene.geometry, moving=(model,)), models=(model,))
+    posed = moving.at(1.0)
+    g = posed.geometry
+    still = replace(posed, geometry=Geometry(g.positions, g.faces, g.face_materials, g.normals, g.uvs), models=())
+    one = renderer(SIZE, graph)
+    one.render(moving, vpls=8)
+    found = one.render(moving, vpls=8, time=1.0).radiance
+    expected = renderer(SIZE, graph).render(still, vpls=8).radiance
+    np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-4)

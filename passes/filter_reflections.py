@@ -11,15 +11,15 @@ from dataclasses import dataclass
 from math import cos, radians
 from typing import ClassVar
 
-from deferred_ir.frame.facts import EMITS, GLOSS
+from deferred_ir.frame.facts import explain_no_gloss
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.facts import Facts
 from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
-from deferred_ir.pool.reflections import ALIKE
 from deferred_ir.pool.samples import read_layout
+from deferred_ir.pool.traced_pixels import ALIKE
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,7 @@ class FilterReflections(Pass):
 
     def unneeded(self, facts: Facts) -> str | None:
         """Leave the pass out where nothing is glossy or nothing shines."""
-        if not facts[GLOSS]:
-            return "no surface is glossy"
-        return None if facts[EMITS] else "nothing shines"
+        return explain_no_gloss(facts)
 
     def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
         """Say that reflections are filtered."""

@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 
 from deferred_ir.base.arrays import Array
-from deferred_ir.frame.facts import EMITS, GLOSS
+from deferred_ir.frame.facts import explain_no_gloss
 from deferred_ir.frame.frame import Frame
 from deferred_ir.frame.pass_io import Io
 from deferred_ir.graph.facts import Facts
@@ -22,8 +22,9 @@ from deferred_ir.graph.params import param
 from deferred_ir.graph.pass_base import Pass
 from deferred_ir.graph.ports import Description, Input, Output, Texture
 from deferred_ir.pool.effort import accept_effort, read_effort
-from deferred_ir.pool.reflections import GlossyPixels, Reflections, choose_traced
+from deferred_ir.pool.reflections import GlossyPixels, Reflections
 from deferred_ir.pool.samples import read_layout
+from deferred_ir.pool.traced_pixels import choose_traced
 from deferred_ir.pool.vpl_choice import VplChoice
 from deferred_ir.scene.scene import Scene
 from deferred_ir.scene.surfaces.brdf import make_gloss
@@ -65,9 +66,7 @@ class ReflectionRays(Pass):
 
     def unneeded(self, facts: Facts) -> str | None:
         """Leave the pass out where nothing is glossy or nothing shines."""
-        if not facts[GLOSS]:
-            return "no surface is glossy"
-        return None if facts[EMITS] else "nothing shines"
+        return explain_no_gloss(facts)
 
     def explain_shared_error(self, facts: Facts, inputs: Mapping[str, Description | None]) -> str | None:
         """Say what of light paths is left out."""

@@ -22,7 +22,7 @@ from deferred_ir.scenes.shapes import Mesh
 
 WIDTH, HEIGHT = 5.6, 3.4
 FRONT, BACK = 5.2, -2.0
-"""Of the room, along z."""
+"""Where the room begins and ends along z."""
 ROUGHNESS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 RADIUS, APART = 0.34, 0.8
 STEP = 0.9

@@ -31,6 +31,13 @@ BLURRED_GLOSS = (
 SOFTWARE = Fact("software", unknown=True, doc="OpenGL draws on the CPU.")
 
 
+def explain_no_gloss(facts: Facts) -> str | None:
+    """Return why a pass that works on reflections is not needed; None if there may be any."""
+    if not facts[GLOSS]:
+        return "no surface is glossy"
+    return None if facts[EMITS] else "nothing shines"
+
+
 def collect_facts(scene: Scene, size: tuple[int, int] | None = None, *, software: bool | None = None) -> Facts:
     """Return what planning may know of `scene` and, where they are given, of the frame's size and the device."""
     direct = scene.direct_lights

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from deferred_ir.base.arrays import Array, Bools, Ints
+from deferred_ir.base.arrays import Array, Ints
 from deferred_ir.base.colour import LUMINANCE
 from deferred_ir.base.parallel import run_in_order
-from deferred_ir.pool.layout import LONELY, Layout
+from deferred_ir.pool.traced_pixels import WIDE
 from deferred_ir.pool.vpl_choice import VplChoice
 from deferred_ir.rays.pixel_surfaces import Surfaces
 from deferred_ir.rays.tracer import Hits, Tracer
@@ -29,40 +29,10 @@ PIXELS = 1 << 12
 """Pixels of a task: few enough for their arrays to stay in a core's cache."""
 MOST_REFLECTIONS = 4
 """Surfaces that a ray meets at most; only glossy ones send it on."""
-WIDE, ALIKE = 0.1, 0.1
-"""Of lobes wider than this, roughness 0.32, a sample's reflections stand for pixels around it whose roughness differs
-by no more than the second."""
 TIMES = 4
 """Where rays of narrower lobes first hit, light is drawn so many times: the filter finds little to average there."""
 LEAST_SHARE = 0.02
 """Reflectances below this are taken as this where light is carried over its reflectance."""
-
-
-def choose_traced(layout: Layout, blend: Ints, roughness: Array) -> Bools:
-    """Return which glossy pixels trace rays, bool (H * W,): for others samples of the layout stand, which do.
-
-    blend: what each pixel takes of which samples, uint32 (H * W,), see lib/pool/blend.glsl. roughness: of each pixel,
-    float32 (H * W,), below 0 where it is not glossy.
-    """
-    (width, height), scale = layout.size, layout.scale
-    glossy = roughness >= 0
-    wide: Bools = glossy & (roughness**2 > WIDE)
-    grid = np.zeros(width * height, bool)
-    pixels = layout.find_grid_pixels()
-    grid[pixels] = True
-    traced: Bools = glossy & ~(wide & ~grid & ((blend & LONELY) == 0))
-    rest = np.flatnonzero(glossy & ~traced)
-    y, x = np.divmod(rest, width)
-    column, row = ((at - offset + scale) // scale - 1 for at, offset in zip((x, y), layout.offset, strict=True))
-    served = np.zeros(len(rest), bool)
-    for corner in range(4):
-        across = np.clip(column + (corner & 1), 0, pixels.shape[1] - 1)
-        up = np.clip(row + (corner >> 1), 0, pixels.shape[0] - 1)
-        sample = pixels[up, across]
-        share = blend[rest] >> (7 * corner) & 127
-        served |= (share > 0) & wide[sample] & (np.abs(roughness[sample] - roughness[rest]) <= np.float32(ALIKE))
-    traced[rest[~served]] = True
-    return traced
 
 
 @dataclass(frozen=True, eq=False)

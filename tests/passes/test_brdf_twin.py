@@ -94,7 +94,10 @@ def test_a_gbuffer_holds_what_rays_look_up(renderer, make):
     scene, size = make(), (64, 64)
     found = read_gbuffer(renderer(size, "deferred"), scene, ("albedo", "material", "normals", "depth"))
     seen = PathTracer(scene, Tracer(scene)).trace_camera_rays(size)
-    flip = lambda image: image.reshape(64, 64, -1)[::-1]  # noqa: E731
+
+    def flip(image):
+        return image.reshape(64, 64, -1)[::-1]
+
     hit = flip(seen.hit)[..., 0] & (found["depth"][..., 0] > 0)
     alpha, metallic = found["material"][..., 0] ** 2, found["material"][..., 1]
     base = found["albedo"][..., :3]

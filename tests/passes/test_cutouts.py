@@ -53,7 +53,7 @@ def test_forward_and_deferred_cut_alike(projection):
 
 
 def test_vpls_shine_through_holes_in_maps_of_every_kind(renderer):
-    """Of the light from VPLs, shadows of rays and of paraboloid maps leave as much."""
+    """Paraboloid maps leave as much light whichever way they are split, and rays as much as the path tracer."""
     scene = lattice()
     adaptive = renderer(SIZE, "hemisphere").render(scene, vpls=64).radiance
     pre = renderer(SIZE, "hemisphere", set={"shadow_maps.tessellation": "pre"}).render(scene, vpls=64).radiance

@@ -28,7 +28,7 @@ def pack_materials(scene: Scene, layers: Ints, arrays: Ints) -> dict[int, Array]
     layers, arrays: of each slot's texture, (slots, materials), see SceneTextures; an array -1 is none.
     """
     materials, refs = scene.materials, _find_refs(scene)
-    tables = {COLORS: np.array([(*material.base_color, material.alpha) for material in materials], "f4")}
+    tables = {COLORS: np.array([(*material.base_color, 0) for material in materials], "f4")}
     if scene.shows_emission:
         tables[EMISSIONS] = np.array([(*m.emission, m.emits_both_sides) for m in materials], "f4")
     if scene.has_gloss or any(m.normal_texture for m in materials):

@@ -161,8 +161,7 @@ def read_sampler(sampler: Json) -> Sampler:
     """Return a glTF sampler; one without filters is as if there were none, but for how it wraps."""
     wrap = WRAPS[sampler.get("wrapS", 10497)], WRAPS[sampler.get("wrapT", 10497)]
     minify, mipmaps = MINIFY[sampler.get("minFilter", 9729)]
-    authored = "minFilter" in sampler or "magFilter" in sampler
-    return Sampler(wrap, MAGNIFY[sampler.get("magFilter", 9729)], minify, mipmaps, authored)
+    return Sampler(wrap, MAGNIFY[sampler.get("magFilter", 9729)], minify, mipmaps)
 
 
 def read_transform(transform: Json) -> Affine:

@@ -44,14 +44,13 @@ class Texture:
 class Sampler:
     """How a texture is read beyond its edges and between its texels.
 
-    mipmaps: how levels are chosen where it is made smaller; None: level 0 alone. authored: whether a file says so.
+    mipmaps: how levels are chosen where it is made smaller; None: level 0 alone.
     """
 
     wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
     magnify: Filter = "linear"
     minify: Filter = "linear"
     mipmaps: Filter | None = None
-    authored: bool = False
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@
 #endif
 
 layout(std430, binding = 0) readonly buffer Faces { vec4 faces[]; };          // geometric normal, material's number
-layout(std430, binding = 1) readonly buffer Materials { vec4 materials[]; };  // base colour, linear RGB; coverage
+layout(std430, binding = 1) readonly buffer Materials { vec4 materials[]; };  // base colour, linear RGB
 uniform int first_face;  // of this draw call: gl_PrimitiveID starts at 0 in each
 
 #if EMITS
